@@ -222,6 +222,14 @@ def test_few_scenes_share_a_figure_and_many_have_one_each(tmp_path):
     assert names[0] == "work_precision_0_e-on-s-8-points-p=0.1.pdf"
 
 
+def test_a_solver_without_transforms_is_drawn(gfmd):
+    done = gfmd("bench", "spec.toml", "-q", "--set", "elastomer.n=0", "--set", "solver.kind='auto'")
+    assert done.exit_code == 0
+    assert "log" not in done.output  # a warning of a logarithmic axis
+    (line,) = (line.split() for line in done.output.splitlines() if "sort" in line)
+    assert line[line.index("sort") + 1] == "0"
+
+
 def test_bench_prints_a_table_and_keeps_file_and_figure(gfmd):
     result = gfmd("bench", "spec.toml", "--figures", "out")
     assert result.exit_code == 0, result.output

@@ -233,6 +233,18 @@ def average_pixels(values, shape):
     return grid.average(values, target)
 
 
+@pytest.mark.parametrize(("n", "p_star", "tolerance"), [(1, 1e6, 1e-13), (1.5, 3, 1e-15)])
+def test_a_tolerance_below_the_rounding_ends_the_solve(n, p_star, tolerance):
+    contact = build_free_scene(SelfAffine(cutoff=0.2), Power(n=n), 20).contact(p_star)
+    solution = solve_contact(contact, Auto(tolerance=tolerance))
+    assert solution.status == "rounding"
+    assert solution.steps < 1000
+    assert solution.residual < 1e-7
+    fresh = copy.deepcopy(solution)
+    fresh.recompute(contact)
+    assert fresh.residual == pytest.approx(solution.residual, rel=0.5)
+
+
 def test_averages_over_larger_pixels_keep_the_mean():
     values = np.random.default_rng(0).random((12, 15))
     halved = average_pixels(values, (6, 15))

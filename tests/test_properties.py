@@ -376,30 +376,22 @@ def test_the_gap_of_a_thin_slab_is_that_of_a_plate_up_to_the_square_of_its_thick
 
 @pytest.mark.parametrize("n", [0, 1, 4])
 @pytest.mark.parametrize("p_star", [1e-30, 1e-20, 1e-12, 40.0, 1e6])
-def test_pressures_at_both_ends_say_what_was_reached(n, p_star):
+def test_pressures_at_both_ends_are_solved(n, p_star):
     tables = plain_tables(
         elastomer=elastomer_table(n), load={"p_star": p_star}, grid={"points": 64}
     )
     tables["solver"] = {"tolerance": 1e-6, "max_steps": 3000}
     solved = solve(tables)
-    reached = solved.solution.residual < 1e-6
-    assert reached == (solved.solution.status == "converged")
-    assert reached == (p_star > 1 or n > 0)  # by a direct solution
+    assert solved.solution.residual < 1e-6
+    assert solved.solution.status == "converged"
     if p_star < 1e-15:  # one point in contact
         verdicts = {name: estimate.verdict for name, estimate in solved.estimates.items()}
         diverging = {"sigma_p": "diverges"} if n == 4 else {}  # for n >= 3
         assert verdicts == {**dict.fromkeys(verdicts, "unknown"), **diverging}
         assert solved.solution.transforms < 200
-    if p_star < 1 and n > 0:
+    if p_star < 1:
         assert solved.observables.a_r * 64**2 < 3
         assert solved.solution.sigma.mean() == pytest.approx(p_star, rel=1e-12)
-    if p_star < 1e-15 and n == 0:  # the stress of the point is below the rounding of sigma
-        assert solved.solution.status == "rounding"
-        reason = solved.solution.status.explain(
-            {"residual": solved.solution.residual, "tolerance": 1e-6}
-        )
-        assert "give a larger pressure" in reason
-        assert "loosen" not in reason
     if p_star > 1:
         assert solved.observables.a_r == 1
         assert solved.observables.sigma_p == pytest.approx(1, rel=64 * EPS * p_star)

@@ -265,6 +265,19 @@ def test_springs_are_solved_without_iteration_and_by_iteration_alike():
     assert other.u == pytest.approx(one.u, abs=1e-11)
 
 
+@pytest.mark.parametrize("points", [16, 17, 33])
+@pytest.mark.parametrize("n", [0, 1, 3])
+@pytest.mark.parametrize("p_star", [1e-30, 1e-20, 1e-10])
+def test_the_highest_point_carries_the_smallest_pressures(n, p_star, points):
+    contact = scene(SelfAffine(cutoff=0.2), Power(n=n), points).contact(p_star)
+    solution = solve_contact(contact, Auto())
+    assert solution.status == "converged"
+    touching = solution.sigma > 0
+    assert touching.sum() == 1
+    assert contact.height[touching] == contact.height.max()
+    assert solution.sigma[touching] == pytest.approx(p_star * points**2)
+
+
 def test_sorting_refuses_what_is_not_flat():
     contact = scene(ROUGH, Power(n=0.5), POINTS).contact(0.1)
     assert not is_flat(contact)

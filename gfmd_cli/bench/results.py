@@ -25,6 +25,8 @@ from gfmd_cli.status import Status
 from gfmd_cli.study.columns import PARAMETERS
 
 FULL_WIDTH, ROW_HEIGHT = 2.09 * WIDTH, 2.0  # inches: a page of 180 mm; a row of panels
+LEAST_COSTS = {"transforms": 1.0, "seconds": 0.0}
+"""Where less is drawn on the logarithmic axes: "sort" takes no transform."""
 MAX_CONTACTS = 4  # rows of panels that a page holds
 COST_LABELS = {
     "transforms": "transforms of the solved size",
@@ -154,11 +156,12 @@ def _curve(
     """One solve, its end marked; thin, the error itself. Returns where it begins and ends."""
     errors = _errors(trace)
     finite = np.isfinite(errors)
-    x, y = trace.samples[cost][finite], errors[finite]
+    costs = np.maximum(trace.samples[cost], LEAST_COSTS[cost])
+    x, y = costs[finite], errors[finite]
     options = {"color": style.colour, "mfc": "white", "lw": 1.3, "marker": style.marker}
     if x.size == 0:
         plot.line_on(axes, style.label, x, y, **options)
-        return float(trace.samples[cost][0]), float(trace.samples[cost][-1])
+        return float(costs[0]), float(costs[-1])
     error = np.maximum(trace.samples["u_g_error"][finite], y.min())
     axes.plot(x, error, color=style.colour, lw=0.4, alpha=0.6)
     plot.line_on(axes, style.label, x, y, markevery=0.2, **options)

@@ -122,13 +122,16 @@ class Dual(Solver):
             direction = new_direction(contact.grid, -z[chosen], last, stress, -force[chosen])
             state.direction[...] = 0.0
             state.direction[chosen] = direction  # [3]
-            self._advance(contact, state, chosen)  # [4], [5]
-            self._assess(contact, state)
-            state.exact = False
+            if self._advance(contact, state, chosen):  # [4], [5]
+                self._assess(contact, state)
+                state.exact = False
+            else:
+                self.refresh(contact, state)
+                state.count_miss()
             state.step += 1
 
-    def _advance(self, contact: FreeContact, state: DualState, chosen: Mask) -> None:
-        """Move along the direction such that the energy does not rise."""
+    def _advance(self, contact: FreeContact, state: DualState, chosen: Mask) -> bool:
+        """Move along the direction such that the energy falls; false where rounding hides how."""
         free, grid, stress, change = contact.free, contact.grid, state.sigma, state.change
         if state.length == 0:
             free.displacement(state.direction, out=change)
@@ -147,7 +150,7 @@ class Dual(Solver):
             state.length, state.slope = 0.5 * state.length, 0.0
         else:
             change[...] = 0.0
-            return
+            return False
         free.displacement(move, out=change)
         state.transforms += free.transforms
         curvature = grid.dot(move, change)
@@ -164,6 +167,7 @@ class Dual(Solver):
             np.maximum(stress + choice.fraction * move, 0.0, out=stress)
         change *= choice.fraction
         state.gap += change
+        return True
 
 
 def _new_state(u: Field, stress: Field, gap: Field) -> DualState:

@@ -44,10 +44,16 @@ class State:
     coarser_transforms: float = 0.0
     """Transforms before this grid was entered, in units of transforms on the finest grid."""
     misses: int = 0
-    """Number of consecutive computations of sigma from u whose residual missed the tolerance with
-    little progress."""
+    """Number of consecutive computations afresh, of sigma from u or of the gap from sigma, whose
+    residual missed the tolerance with little progress."""
     best_residual: float = inf
     """Smallest residual measured on a sigma computed afresh."""
+
+    def count_miss(self) -> None:
+        """Count a residual that misses the tolerance although it was computed afresh."""
+        has_progressed = self.residual < PROGRESS_FACTOR * self.best_residual
+        self.misses = 0 if has_progressed else self.misses + 1
+        self.best_residual = min(self.best_residual, self.residual)
 
 
 @dataclass
@@ -178,9 +184,7 @@ def solve(contact: Contact, solver: Solver, state: State, watch: Watch = ignore)
         if current.residual < max(solver.tolerance, current.rounding) and not current.exact:
             solver.refresh(contact, current)
             if current.residual >= solver.tolerance:
-                progress = current.residual < PROGRESS_FACTOR * current.best_residual
-                current.misses = 0 if progress else current.misses + 1
-                current.best_residual = min(current.best_residual, current.residual)
+                current.count_miss()
         watch(contact, current)
         if not isfinite(current.residual):
             return Status.DIVERGED

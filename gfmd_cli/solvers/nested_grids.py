@@ -67,9 +67,12 @@ def solve_contact(
     ----------
     watch : is called with every state on every grid, and with the last state of the coarse grid at
         every step of a start on tiles and for every set of points of a direct one
-    resume : the state of an unfinished solve; without it the solve starts on the coarsest grid
+    resume : the state of an unfinished solve; without it the solve starts on the coarsest grid.
+        A solver that does not iterate needs none
     """
     solver = solver.for_contact(contact)
+    if not solver.iterative:
+        resume = None
     loose = solver.model_copy(update={"tolerance": max(solver.tolerance, COARSE_TOLERANCE)})
     grids = _grids(contact, solver, resume)
     transforms = 0.0  # of the size of the finest grid
@@ -113,7 +116,8 @@ def solve_contact(
         state, status = _with_pressed_laid(contact, solver, state, watch)
     transforms = state.coarser_transforms + state.transforms
     fields, work = (state.u, state.sigma, state.residual), (state.step, transforms)
-    return Solution(*fields, status, solver.kind, *work, direct is not None)
+    is_direct = direct is not None or not solver.iterative
+    return Solution(*fields, status, solver.kind, *work, is_direct)
 
 
 def _with_pressed_laid(
@@ -164,6 +168,8 @@ def _direct_solution(
     rounding = contact.rounding(state.u)
     if residual == inf and rounding >= MAX_ROUNDING * solver.tolerance:
         touching = contact_points(contact.obstacle, state.u, state.sigma)
+        if not touching.any():  # by rounding of sigma, which can exceed the pressure
+            touching = state.u == contact.obstacle
         start = direct_start(touching, [contact], partial(watch, contact, state))
         if start is not None and start.residual < inf:
             spent, before = state.transforms + start.transforms, state.coarser_transforms
