@@ -55,11 +55,16 @@ def fast_length(points: float) -> int:
 
 @cache
 def processor() -> str:
-    """The model name of the processor: a plan measured on one is a bad one on another."""
+    """The model name of the processor: a plan measured on one is a bad one on another.
+
+    Without a name (ARM), the numbers of the vendor and the model.
+    """
     with suppress(OSError):
-        for line in Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines():
-            if line.startswith("model name"):
-                return line.partition(":")[2].strip()
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+        for keys in (("model name",), ("CPU implementer", "CPU part")):
+            found = [line.partition(":")[2].strip() for line in lines if line.startswith(keys)]
+            if found:
+                return " ".join(dict.fromkeys(found))
     return platform.processor()
 
 

@@ -232,7 +232,8 @@ def repeated_lines(heights: Field) -> str:
         equal = 1 + np.flatnonzero((lines[1:] == lines[:-1]).all(axis=1))
         if not 0 < equal.size < len(lines) - 1:
             continue
-        checked = equal[:: 1 + equal.size // CHECKED_LINES]
+        checked = equal[(equal > 1) & (equal < len(lines) - 1)]
+        checked = checked[:: 1 + checked.size // CHECKED_LINES]
         is_varied = any(2 * np.unique(lines[i]).size >= lines.shape[1] for i in checked)
         if is_varied and not any(_is_mirror(lines, i) for i in checked):
             return (
@@ -243,8 +244,10 @@ def repeated_lines(heights: Field) -> str:
 
 
 def _is_mirror(lines: Field, i: int) -> bool:
-    """Whether a map is mirrored between the lines i - 1 and i."""
-    return np.array_equal(lines[i + 1 : i + 3], lines[i - 3 : i - 1][::-1])
+    """Whether a map is mirrored between the lines i - 1 and i: one line beyond them, or two."""
+    beyond = min(2, i - 1, len(lines) - i - 1)
+    is_same = np.array_equal(lines[i + 1 : i + 1 + beyond], lines[i - 1 - beyond : i - 1][::-1])
+    return is_same and not np.array_equal(lines[i], lines[i + 1])
 
 
 def _kink(heights: Field, axis: int) -> float:

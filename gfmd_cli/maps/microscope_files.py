@@ -6,7 +6,7 @@ import warnings
 from codecs import BOM_UTF8
 from dataclasses import replace
 from io import BytesIO
-from math import log2
+from math import inf, log2
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -310,6 +310,8 @@ def _cut_off(shape: tuple[int, ...], sides: tuple[float, ...]) -> str:
 
     Scans may have fewer lines than points per line, but then a half, a quarter, ... of them.
     """
+    if not all(0 < side < inf for side in sides):
+        return ""  # refused later
     along_y, along_x = (side / points for side, points in zip(sides, shape, strict=True))
     octaves = log2(along_y / along_x)
     if abs(octaves - round(octaves)) < MAX_OFF_SQUARE:

@@ -145,15 +145,15 @@ def _header(lines: list[bytes], count: int) -> tuple[list[int], list[float | Non
         is_complete = len(of_columns) == count
         if is_complete and any(of_columns):
             units = of_columns
-        is_unclear = not is_complete and any(in_metres(unit) for unit in of_columns)
+        is_unclear |= not is_complete and any(in_metres(unit) for unit in of_columns)
     units = [units[place] for place in order if units]
     if stated := dict(UNITS_OF_GWYDDION.findall("\n".join(texts))):
-        units, is_unclear = [stated.get("Lateral", "")] * (count - 1), False
-        units.append(stated.get("Value", ""))
-    if is_unclear or "" in units[:-1]:
+        units = [*[stated.get("Lateral", "")] * (count - 1), stated.get("Value", "")]
+    if "" in units[:-1] or (is_unclear and not units):
+        example = "x [um] y [um] z [nm]" if count == 3 else "x [um] z [nm]"
         raise InputError(
             f"the header of the table states units, but not one for each of the {count} "
-            "columns, as 'x [um] z [nm]' does: add them, or remove the header"
+            f"columns, as {example!r} does: add them, or remove the header"
         )
     return order, [factor("the header of the table", unit) for unit in units]
 

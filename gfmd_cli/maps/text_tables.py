@@ -300,13 +300,14 @@ def in_utf8(file: BinaryIO) -> BinaryIO:
     end = part(file, max(0, file.seek(0, os.SEEK_END) - WINDOW_BYTES))
     is_plain = start.isascii() and b'"' not in start and end.isascii()
     is_plain = is_plain and not OLD_LINE_END.search(start)
-    is_table = start.startswith((*UTF_16, codecs.BOM_UTF8))
+    is_utf_16 = _is_utf_16(start)
+    is_table = is_utf_16 or start.startswith(codecs.BOM_UTF8)
     if not (is_plain or is_table or start.startswith(LATIN_1)):
         is_table = columns(file) > 0 or columns(file, b" \t;") > 0  # also with decimal commas
     if not is_table:
         return file
     content = part(file).removeprefix(codecs.BOM_UTF8)
-    if start.startswith(UTF_16):
+    if is_utf_16:
         content = content.decode("utf-16").encode()
     try:
         content.decode()
@@ -318,6 +319,15 @@ def in_utf8(file: BinaryIO) -> BinaryIO:
             "with decimal points, or separate them by semicolons"
         )
     return BytesIO(OLD_LINE_END.sub(b"\n", content).replace(b'"', b""))
+
+
+def _is_utf_16(start: bytes) -> bool:
+    """Whether the start of a file is text in UTF-16: mostly ASCII, and without zeros.
+
+    Others begin with the same two bytes, such as 16-bit heights of which the first is -2 or -257.
+    """
+    text = start.decode("utf-16", "replace") if start.startswith(UTF_16) else "\0"
+    return "\0" not in text and 2 * len(text.encode("ascii", "ignore")) > len(text)
 
 
 def columns(file: BinaryIO, separators: bytes = b" \t,;") -> int:

@@ -441,7 +441,8 @@ class FileSurface(RigidSurface):
                 self.edges == "window"
             ),
             "mirrored to twice the side": self.edges == "mirror",
-            "periodic": self.edges in (None, "none") and not is_free and not self.has_borders,
+            "periodic": self._is_repeated() and not is_free,
+            "repeated as it is": self.edges == "none" and not self._is_periodic() and not is_free,
             f"interpolation on finer grids: {self.applied_interpolation()}": True,
         }
         return ", ".join(step for step, applies in steps.items() if applies)
