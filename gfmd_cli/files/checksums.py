@@ -1,4 +1,4 @@
-"""Checksums: at the end of a file they show whether the content has changed, digests name it."""
+"""Checksums at the end of a file show whether it has changed; digests are names of contents."""
 
 import hashlib
 import json

@@ -39,7 +39,10 @@ class Waits(NamedTuple):
     until: float = inf
     """Time of the monotonic clock after which such a process does so, too [s]."""
     run: int = 0
-    """The process of the run of a worker: no wait for another worker is announced."""
+    """Process id of the run that started this worker, 0 if this is none.
+
+    Waits for other workers of the run are not announced.
+    """
 
 
 AS_LONG_AS_NEEDED = Waits()

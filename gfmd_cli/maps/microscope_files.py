@@ -194,11 +194,11 @@ def _read_channel(path: Path, file: BinaryIO, reader: Any, dataset: str | None) 
         _check_is_own_netcdf(reader)
     stored = channel.topography(physical_sizes=(1.0,) * len(shape) if unsized else None)
     scan = stored if stored.unit is None else stored.to_unit("m")
-    lines = text_tables.header(file, (1, *shape[1:])[-1]) if kind == "asc" else []
+    lines = text_tables.lines_above(file, (1, *shape[1:])[-1]) if kind == "asc" else []
     if kind == "asc" and len(shape) == 2:
         _check_matrix(file, scan, unsized)
         _check_nova(lines)
-        _check_wyko(_header(channel))
+        _check_wyko(_metadata(channel))
     heights, sides = heights_and_sides(scan, rows_along_y)
     if kind == "nms":
         sides = _nanofocus_sides(file, shape)
@@ -322,7 +322,7 @@ def _cut_off(shape: tuple[int, ...], sides: tuple[float, ...]) -> str:
     )
 
 
-def _header(channel: Any) -> dict[str, Any]:
+def _metadata(channel: Any) -> dict[str, Any]:
     """The keys and values of the header of a text table."""
     header = (channel.info or {}).get("raw_metadata")
     return header if isinstance(header, dict) else {}
@@ -347,7 +347,7 @@ def _check_sides(channel: Any) -> None:
 
     The reader takes the unit of the heights as that of the sides, which is seldom true.
     """
-    sides, header = channel.physical_sizes or (), _header(channel)
+    sides, header = channel.physical_sizes or (), _metadata(channel)
     is_bare = "xunit" in header and not header["xunit"] and not header.get("yunit")
     if len(sides) == 2 and is_bare and header.get("zunit"):
         raise InputError(
@@ -364,7 +364,7 @@ def _check_sides(channel: Any) -> None:
 
 def _sides_with_unit(channel: Any, sides: tuple[float, ...]) -> tuple[float, ...] | None:
     """The sides [m] of a text table whose header states units of them but not of the heights."""
-    header = _header(channel)
+    header = _metadata(channel)
     unit_x = header.get("xunit") or ""  # which is not a known unit
     units = (header.get("yunit") or unit_x, unit_x)[-len(sides) :]
     factors = [in_metres(unit) for unit in units]

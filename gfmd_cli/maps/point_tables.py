@@ -65,7 +65,7 @@ def read_points(file: BinaryIO) -> HeightMap | None:
         return None
     if count == 3 and _is_numbered(table):
         table, count = table[:, 1:], 2
-    order, factors = _header(lines[:first], count)
+    order, factors = _order_and_units(lines[:first], count)
     table = table[:, order]
     if not np.isfinite(table[:, :-1]).all():
         raise InputError("a position in the table is missing or infinite")
@@ -129,7 +129,7 @@ def _is_numbered(table: Field) -> bool:
     return bool(np.ptp(table[:, 1]) > 0 and _steps(table[:, 1:2], indices)[1] <= MAX_DEVIATION)
 
 
-def _header(lines: list[bytes], count: int) -> tuple[list[int], list[float | None]]:
+def _order_and_units(lines: list[bytes], count: int) -> tuple[list[int], list[float | None]]:
     """The places of x, y and height among the columns, and metres per unit of each of these.
 
     There are no factors if no unit is stated. Raises InputError for an unknown unit, and where some

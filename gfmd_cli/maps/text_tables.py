@@ -24,7 +24,7 @@ MAX_WINDOWS = 32  # of a file; those of a larger one leave gaps
 SCANNED_BYTES = 2**26  # in which a row of another length is looked for; a choice
 HEADER_LINES = 200  # that may differ from the table: as many as SurfaceTopography skips
 SAMPLE_BYTES = 2**16  # at the end of each window; a choice
-MIN_DIGIT_FRACTION = 0.2  # of the characters of a table, most of which are digits; a choice
+MIN_DIGIT_FRACTION = 0.2  # smallest fraction of digits among the characters of a table; a choice
 GRID_LINES = 20_000  # whose positions are compared; a choice
 SIZE_BYTES = 100  # of a line with two numbers
 MATRIX_COLUMNS = 4  # fewer are positions: the rule of SurfaceTopography
@@ -109,7 +109,7 @@ def sides_in(lines: list[bytes]) -> list[float]:
     return [float(value) * unit for value, unit in sides if is_number(value) and unit is not None]
 
 
-def header(file: BinaryIO, width: int) -> list[bytes]:
+def lines_above(file: BinaryIO, width: int) -> list[bytes]:
     """The lines above the first row of so many numbers, without empty ones."""
 
     def is_above(line: bytes) -> bool:
@@ -164,7 +164,9 @@ def shorter_or_longer_row(file: BinaryIO) -> str:
 
 
 def with_blanks(file: BinaryIO) -> tuple[BinaryIO, str]:
-    """A matrix with commas or semicolons as one between blanks, and decimal commas as points.
+    """A matrix whose numbers are separated by commas or semicolons, rewritten with blanks.
+
+    Decimal commas become points.
 
     A comma between two digits is a decimal one where blanks or semicolons separate the numbers.
     Any other file is returned as it is: the readers of positions know commas and semicolons.
@@ -272,9 +274,9 @@ def _warning_of_points(rows: list[bytes]) -> str:
     Where they are decimal, some number has another number of decimals.
     """
     words = [row.split() for row in rows] or [[]]
-    columns = zip(*(row for row in words if len(row) == len(words[-1])), strict=True)
+    cells = zip(*(row for row in words if len(row) == len(words[-1])), strict=True)
     pointed, whole = [], []
-    for column in columns:
+    for column in cells:
         with_point = [word for word in column if b"." in word]
         if 0 < len(with_point) < len(column):
             pointed += with_point
@@ -333,8 +335,8 @@ def _is_utf_16(start: bytes) -> bool:
 def columns(file: BinaryIO, separators: bytes = b" \t,;") -> int:
     """Columns of a table of numbers between separators, 0 for any other file.
 
-    All lines have the same number of them, but for lines with words, which are headers, and a last
-    line that is cut short.
+    All lines after the first `HEADER_LINES` have this number, or, of a file with fewer lines, the
+    last complete one. Lines with words do not count.
     """
     blanks = bytes.maketrans(separators, b" " * len(separators))
     width = 0
@@ -354,7 +356,10 @@ def columns(file: BinaryIO, separators: bytes = b" \t,;") -> int:
 
 
 def _windows(file: BinaryIO) -> Iterator[tuple[int, bytes]]:
-    """Position and whole lines of parts of a file; a line of more than a window has no content."""
+    """Position and whole lines of parts of a file.
+
+    It stops with one zero byte at a line longer than a window.
+    """
     size = file.seek(0, os.SEEK_END)
     gap = max(0, size // MAX_WINDOWS - WINDOW_BYTES)
     position = 0
