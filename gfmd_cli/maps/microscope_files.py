@@ -155,14 +155,12 @@ def _in_known_form(file: BinaryIO, start: bytes) -> BinaryIO:
 
     The comment of TrueMap ends with a zero, but the reader takes one of 24 bytes for granted.
     """
-    file.seek(0)
     if start.startswith(TRUEMAP) and (end := start.find(b"\0", TRUEMAP_MAGIC_BYTES) + 1):
-        rest = file.read()[end:]
-        return BytesIO(start[:TRUEMAP_MAGIC_BYTES] + bytes(TRUEMAP_COMMENT_BYTES) + rest)
+        header = start[:TRUEMAP_MAGIC_BYTES] + bytes(TRUEMAP_COMMENT_BYTES)
+        return BytesIO(header + text_tables.part(file, end))
     if start.startswith(MOUNTAINSMAP) and MICROMETRES.search(start):
-        content = file.read()
         header = MICROMETRES.sub(lambda unit: b"\xb5m".ljust(len(unit[0]), b"\0"), start)
-        return BytesIO(header + content[len(start) :])
+        return BytesIO(header + text_tables.part(file, len(start)))
     return file
 
 
@@ -367,10 +365,10 @@ def _sides_with_unit(channel: Any, sides: tuple[float, ...]) -> tuple[float, ...
     header = _metadata(channel)
     unit_x = header.get("xunit") or ""  # which is not a known unit
     units = (header.get("yunit") or unit_x, unit_x)[-len(sides) :]
-    factors = [in_metres(unit) for unit in units]
-    if None in factors:
+    factors = [factor for factor in map(in_metres, units) if factor is not None]
+    if len(factors) < len(units):
         return None
-    return tuple(factor * side for factor, side in zip(factors, sides, strict=True) if factor)
+    return tuple(factor * side for factor, side in zip(factors, sides, strict=True))
 
 
 def check_all_are_heights(table: Field, *, unsized: bool) -> None:

@@ -194,7 +194,7 @@ def with_blanks(file: BinaryIO) -> tuple[BinaryIO, str]:
             numbers = columns(file, b",")
         if is_decimal:
             rows = list(filter(is_numeric, whole))
-            warning = _warning_of_thousands(start, numbers)
+            warning = _warning_of_thousands(rows, numbers)
         if is_decimal or numbers >= MATRIX_COLUMNS:
             text = part(file).replace(b";", b" ")
             file = BytesIO(text.replace(b",", b"." if is_decimal else b" "))
@@ -246,15 +246,14 @@ def _has_empty_cells(rows: list[bytes], separator: bytes) -> bool:
     return len(patterns) > 1
 
 
-def _warning_of_thousands(start: bytes, width: int) -> str:
+def _warning_of_thousands(rows: list[bytes], width: int) -> str:
     """Warning if each number of a table has a comma where it could separate thousands.
 
     One number such as 0,125 or 1,5 shows that the commas are decimal. Raises InputError if only
     some of the numbers have such a comma, as where it separates thousands.
     """
-    lines = [line for line in start.splitlines() if is_numeric(line)]
-    rows = [re.split(rb"[\s;]+", line.strip(b" \t;")) for line in lines]
-    numbers = [word for row in rows if len(row) == width for word in row if word[-1:].isdigit()]
+    cells = [re.split(rb"[\s;]+", row.strip(b" \t;")) for row in rows]
+    numbers = [word for row in cells if len(row) == width for word in row if word[-1:].isdigit()]
     with_comma = [word for word in numbers if b"," in word]
     if not with_comma or not all(map(THOUSANDS.fullmatch, with_comma)):
         return ""

@@ -346,7 +346,7 @@ class FileSurface(RigidSurface):
 
     def tapered_map(self) -> "FileSurface | None":
         """The map with tapered edges, scaled to its own power; None where it is periodic."""
-        if self.edges != "mirror" and not self._is_reflected():
+        if not self.is_mirrored:
             return None
         return TaperedMap.model_construct(**dict(self) | {"edges": "window"})
 
