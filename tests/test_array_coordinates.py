@@ -191,3 +191,19 @@ def test_a_field_of_a_study_has_the_sides_and_the_boundary_of_its_contact(
     assert read.spacing == pytest.approx((0.25e-6, 0.5e-6))
     assert (read.metres, read.metric_heights) == (True, True)
     assert read.periodic == (boundary == "periodic")
+
+
+@pytest.mark.parametrize(
+    "unit", [np.array([b"um"]), np.array(["um"], h5py.string_dtype()), np.bytes_("um")]
+)
+def test_attributes_may_be_text_of_any_kind(array, unit):
+    def name_scale(file):
+        file["x"].attrs["NAME"] = "x"
+
+    read = read_topography(array(units=dict.fromkeys(UNITS, unit), extra=name_scale))
+    assert read.spacing == pytest.approx((0.25e-6, 0.5e-6))
+
+
+def test_an_empty_attribute_states_no_unit(array):
+    read = read_topography(array(units=dict.fromkeys(UNITS, h5py.Empty("S1"))))
+    assert (read.spacing, read.metres) == ((0.25, 0.5), False)

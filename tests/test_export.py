@@ -57,6 +57,16 @@ def line_study(output_of, tmp_path_factory):
     return folder / "s.h5"
 
 
+@pytest.mark.parametrize("suffix", ["csv", "nc", "vti"])
+def test_a_link_to_an_output_stays_a_link(output_of, study, tmp_path, suffix):
+    link = tmp_path / f"link.{suffix}"
+    link.symlink_to("file")
+    task = ("--task", "0") if suffix == "vti" else ()
+    output_of("export", study, "-o", link, *task)
+    assert link.is_symlink()
+    assert (tmp_path / "file").stat().st_size > 0
+
+
 def test_csv_has_the_columns_of_the_layout(output_of, study, tmp_path):
     output_of("export", study, "-o", tmp_path / "s.csv")
     text = (tmp_path / "s.csv").read_text()

@@ -5,8 +5,10 @@ from pathlib import Path
 
 import pytest
 
-from gfmd_cli.files.atomic import NewFile
+from gfmd_cli.errors import GfmdError
+from gfmd_cli.files.atomic import NewFile, check_place, make_folder, target_of, write_whole
 from gfmd_cli.files.cache import cache_folder
+from gfmd_cli.files.checksums import file_digest
 from gfmd_cli.files.regular import open_regular, read_regular
 
 READ, WRITE = os.O_RDONLY, os.O_RDWR | os.O_CREAT
@@ -77,3 +79,28 @@ def test_after_an_error_what_was_not_written_is_read_as_zeros(tmp_path):
         buffer = bytearray(b"wxyz")
         file.readinto(buffer)
     assert buffer == b"ab\0\0"
+
+
+@pytest.mark.parametrize("call", [check_place, make_folder, file_digest])
+def test_a_folder_that_cannot_be_searched_is_one_message(tmp_path, call):
+    with pytest.raises(GfmdError, match=r"cannot be (written|read)"):
+        call(tmp_path / ("long" * 100) / "file")
+
+
+def test_a_file_may_lie_in_a_folder_that_cannot_be_read(tmp_path, monkeypatch):
+    def refuse(path, *_):
+        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), path)
+
+    monkeypatch.setattr("gfmd_cli.files.atomic.os.open", refuse)
+    write_whole(tmp_path / "file", b"content")
+    assert (tmp_path / "file").read_bytes() == b"content"
+
+
+@pytest.mark.parametrize("follow", [False, True])
+def test_only_a_link_of_a_user_is_followed(tmp_path, follow):
+    (tmp_path / "file").write_bytes(b"old")
+    (tmp_path / "link").symlink_to("file")
+    write_whole(target_of(tmp_path / "link") if follow else tmp_path / "link", b"new")
+    assert (tmp_path / "link").is_symlink() == follow
+    assert (tmp_path / "link").read_bytes() == b"new"
+    assert (tmp_path / "file").read_bytes() == (b"new" if follow else b"old")

@@ -1,5 +1,6 @@
 """Tables as spreadsheets, stages and geographic programs write them: rounded, quoted, marked."""
 
+import re
 from itertools import product
 from types import SimpleNamespace
 
@@ -8,6 +9,7 @@ import pytest
 
 from gfmd_cli.errors import InputError
 from gfmd_cli.grid.fft_grid import Grid
+from gfmd_cli.maps import map_warnings
 from gfmd_cli.maps.microscope_files import _height_channel
 from gfmd_cli.maps.topography import Region, read_topography
 from gfmd_cli.physics.file_surface import FileSurface
@@ -156,9 +158,23 @@ def test_a_header_without_units_states_none(saved, header):
     assert (read.metres, read.spacing) == (False, pytest.approx((1.0, 1.0)))
 
 
-def test_a_unit_in_a_sentence_above_a_profile_is_refused(saved):
-    with pytest.raises(InputError, match="not one for each of the 2 columns"):
-        read_topography(saved("# profile of 20 um\n0 1\n1 4\n2 3\n3 1\n"))
+@pytest.mark.parametrize("header", ["# profile of 20 um", "Unit: um\nx z", "x z\n# um"])
+def test_a_unit_that_is_not_that_of_a_column_of_a_profile_is_refused(saved, header):
+    with pytest.raises(InputError, match=r"each of the 2 columns, as 'x \[um\] z \[nm\]' does"):
+        read_topography(saved(f"{header}\n0 1\n1 4\n2 3\n3 1\n"))
+
+
+@pytest.mark.parametrize("sentence", ["# measured in nm steps", "# by a tip of 20 um"])
+def test_a_unit_in_a_sentence_beside_units_of_all_columns_is_not_read(saved, sentence):
+    text = points(np.arange(300), np.arange(12))
+    for names, example in (("x [um] y [um] z [nm]", ""), ("x y z", "x [um] y [um] z [nm]")):
+        for header in (f"{names}\n{sentence}\n", f"{sentence}\n{names}\n"):
+            path = saved(header + text)
+            if example:
+                with pytest.raises(InputError, match=re.escape(example)):
+                    read_topography(path)
+            else:
+                assert read_topography(path).spacing == pytest.approx((1e-6, 1e-6))
 
 
 def test_a_profile_of_one_point_is_refused(saved):
@@ -410,6 +426,21 @@ def test_a_wrong_header_of_an_esri_grid_is_refused(saved, old, new, reason):
         read_topography(saved(GRID.replace(old, new) + matrix(" ")))
 
 
+@pytest.mark.parametrize("parts", [(50, 250), (100,) * 3, (299, 1)])
+def test_a_row_of_an_esri_grid_may_have_several_lines(saved, parts):
+    rows = (np.split(row, np.cumsum(parts)[:-1]) for row in HEIGHTS)
+    text = "".join(matrix(" ", heights=[part]) for row in rows for part in row)
+    assert read_topography(saved(GRID + text)).heights == pytest.approx(HEIGHTS)
+
+
+@pytest.mark.parametrize("shape", [(300, 12), (9, 400), (4, 900)])
+def test_an_esri_grid_whose_rows_begin_within_lines_is_refused(saved, shape):
+    """Also one of interchanged rows and columns: a line of 12 could be a part of a row of 300."""
+    reason = f"{shape[1]} x {shape[0]} heights, but the header states 300 x 12"
+    with pytest.raises(InputError, match=reason):
+        read_topography(saved(GRID + matrix(" ", heights=HEIGHTS.reshape(shape))))
+
+
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig"])
 @pytest.mark.parametrize(
     "first", ["aBCR-1.0", "aISO-1.0", "aNIST-1.0", "DSAA", "Zygo XYZ Data File - Format 1"]
@@ -463,6 +494,12 @@ def test_points_with_normals_or_colours_are_refused(saved):
     table = np.column_stack([x.ravel(), y.ravel(), np.random.default_rng(0).normal(size=(360, 4))])
     with pytest.raises(InputError, match="one of 6 columns is sorted"):
         read_topography(saved(matrix(" ", heights=table)))
+
+
+@pytest.mark.parametrize("side", ["0 um", "-3 um"])
+def test_a_side_that_is_not_positive_is_refused_as_such(saved, side):
+    with pytest.raises(InputError, match="they must be positive"):
+        read_topography(saved(SIZED.replace("12 um", side) + matrix(" ")))
 
 
 @pytest.mark.parametrize("line", ["# Max Height: 2.0 um", "# pixel size = 0.25 um"])
@@ -721,3 +758,23 @@ def test_line_ends_of_old_programs_are_read(saved, end):
     """Below a header with such line ends, or with new ones."""
     path = saved(f"# Width: 4 um{end}# Height: 4 um{end}" + "\r".join(["1 2 3 5", "2 4 1 0"] * 8))
     assert read_topography(path).heights.shape == (16, 4)
+
+
+@pytest.mark.parametrize("first", [-2, -257, -3])
+def test_heights_that_begin_as_text_in_utf_16_are_read(tmp_path, first):
+    heights = np.random.default_rng(0).integers(0, 500, size=(1201, 1201)).astype(">i2")
+    heights[0, 0] = first
+    (tmp_path / "N00E000.hgt").write_bytes(heights.tobytes())
+    np.testing.assert_array_equal(read_topography(tmp_path / "N00E000.hgt").heights, heights)
+
+
+@pytest.mark.parametrize("number", range(4))
+@pytest.mark.parametrize("is_end", [False, True])
+def test_a_mirrored_map_has_no_repeated_lines(number, is_end):
+    """Also where few lines, or none, are left beyond the line at which it is mirrored."""
+    heights = np.random.default_rng(0).normal(size=(12, 20))
+    mirrored = np.vstack([heights[::-1], heights])[11 - number :]
+    repeated = np.vstack([heights[number : number + 1]] * 4 + [heights])
+    for lines, is_repeated in ((mirrored, False), (repeated, True)):
+        warning = map_warnings.repeated_lines(lines[::-1] if is_end else lines)
+        assert ("are equal to the line before" in warning) == is_repeated

@@ -146,3 +146,16 @@ def test_plans_do_not_depend_on_what_else_is_known(wisdom, tmp_path, monkeypatch
             Grid(points).transform()
     assert known[0] == known[-1]
     assert known[0] != known[1]
+
+
+@pytest.mark.parametrize(
+    ("text", "name"),
+    [
+        ("processor : 0\nmodel name : A 1\nprocessor : 1\nmodel name : A 1\n", "A 1"),
+        ("processor : 0\nCPU implementer : 0x41\nCPU part : 0xd40\nCPU part : 0xd41\n",
+         "0x41 0xd40 0xd41"),
+    ],
+)  # fmt: skip
+def test_processors_of_all_kinds_have_names(monkeypatch, text, name):
+    monkeypatch.setattr(plans.Path, "read_text", lambda *_, **__: text)
+    assert plans.processor.__wrapped__() == name

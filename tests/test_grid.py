@@ -1,11 +1,16 @@
 """The grid: one Fourier convention, operators diagonal in q, trigonometric interpolation."""
 
+import gc
+from types import SimpleNamespace
+from weakref import ref
+
 import numpy as np
 import pyfftw
 import pytest
 from fourier import backward, forward
 
 from gfmd_cli.grid import shared_transforms
+from gfmd_cli.grid.distributed import DistributedGrid
 from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.physics.self_affine import SelfAffine
 
@@ -302,3 +307,16 @@ def test_a_plan_measured_for_the_first_time_destroys_nothing(tmp_path, monkeypat
     pyfftw.forget_wisdom()
     fresh = Grid(54)
     np.testing.assert_allclose(backward(fresh, forward(fresh, field)), field, atol=1e-14)
+
+
+def test_a_grid_that_is_shared_is_freed_with_its_last_reference():
+    """Without a search for cycles of references, which may come much later."""
+    gc.disable()
+    try:
+        grid = DistributedGrid(64, ranks=SimpleNamespace(rank=0, size=2))
+        assert grid.rows.count == 32
+        memory = ref(grid._memory[0])
+        del grid
+        assert memory() is None
+    finally:
+        gc.enable()

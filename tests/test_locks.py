@@ -174,6 +174,18 @@ def test_a_wait_for_another_worker_of_the_run_is_not_announced(lock, holder, mon
     assert not caplog.messages
 
 
+def test_a_wait_for_another_process_after_a_worker_of_the_run_is_announced(
+    lock, monkeypatch, caplog
+):
+    monkeypatch.setattr(locks, "LONG_SECONDS", -1.0)
+    monkeypatch.setattr(locks, "_parent", {1: 42, 2: 7}.get)
+    waiting = locks._Wait(lock, Waits(run=42))
+    for pid in (1, 2, 2):
+        waiting.pause(lambda pid=pid: locks._Owner("here", pid))
+    (message,) = caplog.messages
+    assert "in use by process 2 on here" in message
+
+
 def test_shared_locks_of_the_kernel_are_held_side_by_side(lock, holder):
     holder("kernel", "shared")
     with locked(lock, shared=True) as acquired:
@@ -292,6 +304,19 @@ def test_without_locks_a_file_that_names_no_owner_is_refused(lock, monkeypatch, 
     ):
         pass
     assert os.path.lexists(lock.with_name("lock.owner"))
+
+
+def test_without_locks_a_full_disk_leaves_no_lock(lock, monkeypatch):
+    def full(*_):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    without_locks(monkeypatch)
+    with monkeypatch.context() as broken:
+        broken.setattr(locks.json, "dump", full)
+        with pytest.raises(SpaceError, match="No space left"), locked(lock):
+            pass
+    with locked(lock) as acquired:
+        assert acquired
 
 
 def owned_elsewhere(lock):

@@ -354,6 +354,15 @@ def test_a_window_levels_a_map_and_fades_it_to_its_mean(tmp_path):
     assert abs(np.polynomial.polynomial.polyfit(x, h.mean(axis=0), 1)[1]) < 5  # of 50
 
 
+@pytest.mark.parametrize(("periodic", "words"), [(True, ", periodic,"), (False, "as it is,")])
+def test_only_a_map_that_is_periodic_is_called_periodic(tmp_path, periodic, words):
+    np.save(tmp_path / "h.npy", SelfAffine(cutoff=0.05).heights(64))
+    surface = FileSurface(path=tmp_path / "h.npy", periodic=periodic, edges="none")
+    assert surface.parameters()["periodic"] == periodic
+    assert words in surface.preparation("periodic")
+    assert (", periodic," in surface.preparation("periodic")) == periodic
+
+
 def test_a_mirrored_map_has_a_cell_of_twice_the_side(tmp_path):
     np.save(tmp_path / "h.npy", SelfAffine(cutoff=0.05).heights(64))
     mirrored = FileSurface(path=tmp_path / "h.npy", length=3.0, edges="mirror")

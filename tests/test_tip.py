@@ -60,7 +60,7 @@ def test_a_sphere_with_a_conical_shaft_is_recognised_on_steep_slopes(tmp_path, k
     tip = sphere + np.maximum(distance - end, 0.0) / np.tan(shaft)
     scan = grey_dilation(heights, structure=-tip, mode="wrap")
     (warning,) = _warnings(tmp_path, scan, **{"tip_radius": radius} if known else {})
-    assert WORDS.search(warning)
+    assert "too small for an S-filter" in warning
     if not known:
         assert 0.7 * radius < float(re.search(r"radius (\S+) m", warning)[1]) < 1.1 * radius
 
@@ -154,3 +154,16 @@ def test_units_pixels_missing_heights_and_profiles(tmp_path):
     (warning,) = _warnings(tmp_path, line, tip_radius=RADIUS)
     assert WORDS.search(warning)
     assert not _warnings(tmp_path, line)
+
+
+@pytest.mark.parametrize("side", [1e-5, 4e-5])
+def test_both_axes_are_compared_at_the_same_length(tmp_path, side):
+    """Beyond a part of the shorter side nothing is compared, and no filter can be as long."""
+    wave = -1e-7 * np.cos(2 * np.pi * np.arange(64) / 64)
+    waves, sides = wave[:, None] + wave, {"length": 1e-5, "length_y": side}
+    (warning,) = _warnings(tmp_path, waves, tip_radius=1.4e-5, **sides)
+    assert 2e-6 < float(WORDS.search(warning)[1]) < 5e-6
+    cutoff = float(WORDS.search(warning)[2])
+    assert not _warnings(tmp_path, waves, tip_radius=1.4e-5, s_filter=cutoff, **sides)
+    (warning,) = _warnings(tmp_path, waves, tip_radius=2e-5, **sides)
+    assert "too small for an S-filter" in warning

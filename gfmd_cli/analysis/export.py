@@ -17,7 +17,7 @@ from gfmd_cli.analysis.compare import VARIANTS, Comparison
 from gfmd_cli.analysis.ensemble import ensembles
 from gfmd_cli.analysis.table import known, plain
 from gfmd_cli.errors import INSTALL, InputError
-from gfmd_cli.files.atomic import new_file
+from gfmd_cli.files.atomic import new_file, target_of
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.physics.observables import QUANTITIES
 from gfmd_cli.study import columns as layout
@@ -144,7 +144,7 @@ def _labelled_study(path: Path) -> Any:
 def write_netcdf(path: Path, target: Path) -> None:
     """Write a study as netCDF 4. Raises InputError, StudyError, SpaceError."""
     dataset = _labelled_study(path)
-    with new_file(target) as file:
+    with new_file(target_of(target)) as file:
         dataset.to_netcdf(file, engine="h5netcdf")
 
 
@@ -201,7 +201,7 @@ def write_image(study: Path, task: int | None, target: Path) -> None:
         fields = {name: np.ascontiguousarray(values, "<f8") for name, values in arrays.items()}
         sides = [float(stored.rows[index][name]) for name in ("length", "length_y")]
         first = float(stored.rows[index]["x_first"])
-    with new_file(target) as fresh:
+    with new_file(target_of(target)) as fresh:
         fresh.write(_head(fields, sides, first).encode())
         for values in fields.values():
             fresh.write(np.uint64(values.nbytes).astype("<u8").tobytes())

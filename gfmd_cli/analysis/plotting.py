@@ -14,7 +14,7 @@ import numpy as np
 from gfmd_cli.analysis.curve_styles import MAX_NAMED, CurveStyle
 from gfmd_cli.analysis.selection import evenly
 from gfmd_cli.errors import INSTALL, InputError
-from gfmd_cli.files.atomic import write_whole
+from gfmd_cli.files.atomic import target_of, write_whole
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.status import SHORTFALLS, TOLERANCE_NOT_REACHED, Status
 
@@ -182,7 +182,7 @@ class LegendFigure:
         for file in files:
             image, metadata = BytesIO(), METADATA[file.suffix]
             self.figure.savefig(image, format=file.suffix[1:], dpi=dpi, metadata=metadata)
-            write_whole(file, image.getvalue())
+            write_whole(target_of(file), image.getvalue())
 
 
 class ColumnFigure(LegendFigure):

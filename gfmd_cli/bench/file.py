@@ -8,7 +8,7 @@ from typing import Any, Self
 import numpy as np
 
 from gfmd_cli.errors import InputError, StudyError
-from gfmd_cli.files.atomic import check_place, new_file
+from gfmd_cli.files.atomic import check_place, new_file, target_of
 from gfmd_cli.files.hdf5 import find, new_hdf5, open_hdf5, read_dataset, write_scale
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.spec.differences import differences
@@ -75,7 +75,7 @@ class Trace:
 
 def check_target(path: Path, spec: Spec) -> None:
     """Refuse to replace anything but a bench file of this spec. Raises InputError, SpaceError."""
-    check_place(path)
+    check_place(target_of(path))
     if not path.exists():
         return
     try:
@@ -95,7 +95,7 @@ def check_target(path: Path, spec: Spec) -> None:
 
 def write_bench(path: Path, spec: Spec, text: str, traces: list[Trace]) -> None:
     """Write a bench file, a group for each trace, whole or not at all. Raises SpaceError."""
-    with new_file(path) as fresh, new_hdf5(fresh) as file:
+    with new_file(target_of(path)) as fresh, new_hdf5(fresh) as file:
         file.attrs.update({BENCH: BENCH_LAYOUT, **origin(spec, text)})
         for number, trace in enumerate(traces):
             group = file.create_group(f"runs/{number}")

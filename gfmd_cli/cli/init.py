@@ -26,7 +26,7 @@ def init(spec: Path, scan: Path | None, overrides: tuple[str, ...]) -> None:
         gfmd init contact.toml --from nm.npy --set surface.scale=1e-9 --set surface.length=1e-5
         gfmd init steel.toml --from scan.di --set elastomer.E_star=70e9 --set "load.pressure=[1e8]"
     """
-    from gfmd_cli.files.atomic import write_whole
+    from gfmd_cli.files.atomic import target_of, write_whole
     from gfmd_cli.spec.parse import read_scan
     from gfmd_cli.spec.starter import starter, starter_of_scan
 
@@ -41,7 +41,7 @@ def init(spec: Path, scan: Path | None, overrides: tuple[str, ...]) -> None:
         print_text(preparation)
         for warning in warnings:
             print_error(f"gfmd: {scan}: {warning}")
-    write_whole(spec, text.encode())
+    write_whole(target_of(spec), text.encode())
     print_text(f"{spec}: written\nnext: gfmd run {typed(spec)}")
 
 

@@ -82,7 +82,7 @@ def report(study: Path, other: Path | None, output: Path | None, bench: Path | N
 
         gfmd report soft.h5 stiff.h5
     """
-    from gfmd_cli.files.atomic import check_place, write_whole
+    from gfmd_cli.files.atomic import check_place, target_of, write_whole
     from gfmd_cli.report.page import report as page
 
     name = study.stem if other is None else f"{study.stem}-{other.stem}"
@@ -92,8 +92,8 @@ def report(study: Path, other: Path | None, output: Path | None, bench: Path | N
     for source in (study, other, bench):
         if source is not None and os.path.realpath(path) == os.path.realpath(source):
             raise InputError(f"{path}: the report would replace what it is made from; use -o")
-    check_place(path)
-    write_whole(path, page(study, bench, other).encode())
+    check_place(target_of(path))
+    write_whole(target_of(path), page(study, bench, other).encode())
     print_text(str(path))
 
 
@@ -121,13 +121,13 @@ def export(study: Path, output: Path | None, task: int | None) -> None:
     if task is not None and suffix != ".vti":
         raise InputError("--task: chooses fields, for a .vti file")
     from gfmd_cli.analysis.export import export_csv, write_image, write_netcdf
-    from gfmd_cli.files.atomic import write_whole
+    from gfmd_cli.files.atomic import target_of, write_whole
 
     if output is None:
         print_data(export_csv(study))
         return
     if suffix == ".csv":
-        write_whole(output, export_csv(study).encode())
+        write_whole(target_of(output), export_csv(study).encode())
     elif suffix == ".nc":
         write_netcdf(study, output)
     else:

@@ -45,7 +45,9 @@ class NewFile(io.FileIO):
 def new_file(path: Path, aside: Path | None = None) -> Iterator[NewFile]:
     """A file that appears at `path` if the block ends without an error: written aside and renamed.
 
-    `aside` is the folder to write it in, on the same file system; by default that of `path`.
+    `aside` is the folder to write it in, on the same file system; by default that of `path`. A
+    symbolic link at `path` is replaced, see `target_of`.
+
     Raises SpaceError where it cannot be written.
     """
     fresh = (aside or path.parent) / temporary_name(path)
@@ -72,6 +74,11 @@ def new_file(path: Path, aside: Path | None = None) -> Iterator[NewFile]:
             fresh.unlink(missing_ok=True)
 
 
+def target_of(path: Path) -> Path:
+    """The file that a user names by a path: of a symbolic link, the file that it leads to."""
+    return Path(os.path.realpath(path)) if os.path.islink(path) else path
+
+
 def temporary_name(path: Path) -> str:
     """A name that no other file has, for a file that is being written or removed."""
     return f".{path.name}.{uuid4().hex}"
@@ -95,10 +102,10 @@ def write_whole(path: Path, content: bytes) -> None:
 
 def check_place(path: Path) -> None:
     """Raise SpaceError where no file can be written at `path`, before the work for it begins."""
-    _check_target(path)
-    if len(os.fsencode(temporary_name(path))) > os.pathconf(path.parent, "PC_NAME_MAX"):
-        raise SpaceError(f"{path}: cannot be written: the name is too long")
     try:
+        _check_target(path)
+        if len(os.fsencode(temporary_name(path))) > os.pathconf(path.parent, "PC_NAME_MAX"):
+            raise SpaceError(f"{path}: cannot be written: the name is too long")
         TemporaryFile(dir=path.parent).close()
     except OSError as error:
         raise SpaceError(f"{path}: cannot be written: {error.strerror}") from error
@@ -108,6 +115,7 @@ def _check_target(path: Path) -> None:
     """Raise SpaceError for a path in a folder that does not exist, and for a read-only file.
 
     A file that nobody may write is kept, although it could be replaced, and root could write it.
+    Raises OSError where the folder cannot be searched.
     """
     if not path.parent.is_dir():
         raise SpaceError(f"{path}: cannot be written: there is no folder {path.parent}")
@@ -117,15 +125,18 @@ def _check_target(path: Path) -> None:
 
 def make_folder(path: Path) -> None:
     """Make a folder where it is missing, not the folders around it. Raises SpaceError."""
-    _check_target(path)
     try:
+        _check_target(path)
         path.mkdir(exist_ok=True)
     except OSError as error:
         raise SpaceError(f"{path}: cannot be written: {error.strerror}") from error
 
 
 def _sync_folder(folder: Path) -> None:
-    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        descriptor = os.open(folder, os.O_RDONLY)
+    except PermissionError:  # it can be written, but not read
+        return
     try:
         os.fsync(descriptor)
     finally:

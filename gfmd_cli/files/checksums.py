@@ -1,4 +1,4 @@
-"""Checksums: at the end of a file they show whether the content has changed, digests name it."""
+"""Checksums at the end of a file show whether it has changed; digests are names of contents."""
 
 import hashlib
 import json
@@ -80,9 +80,9 @@ def file_version(path: Path, *, follow: bool = True) -> Version:
 
 def file_digest(path: Path) -> str:
     """SHA-256 of a file's content. Raises InputError where it cannot be read."""
-    if not path.is_file():
-        raise InputError(f"{path}: no such file, or not a regular one")
     try:
+        if not path.is_file():
+            raise InputError(f"{path}: no such file, or not a regular one")
         with path.open("rb") as file:
             return hashlib.file_digest(file, "sha256").hexdigest()
     except OSError as error:

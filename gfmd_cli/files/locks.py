@@ -39,7 +39,10 @@ class Waits(NamedTuple):
     until: float = inf
     """Time of the monotonic clock after which such a process does so, too [s]."""
     run: int = 0
-    """The process of the run of a worker: no wait for another worker is announced."""
+    """Process id of the run that started this worker, 0 if this is none.
+
+    Waits for other workers of the run are not announced.
+    """
 
 
 AS_LONG_AS_NEEDED = Waits()
@@ -120,7 +123,7 @@ class _Wait:
             is_foreign = run == 0 or owner is None or _parent(owner.pid) != run
             if is_foreign and not self.is_announced:
                 log.warning("gfmd: waiting for %r, in use by %s", str(self.path), ascii(by)[1:-1])
-            self.is_announced = True
+                self.is_announced = True
         shortest, longest = WAIT_SECONDS
         time.sleep(min(longest, max(shortest, waited / 10)))
 
@@ -204,15 +207,17 @@ def _owned(path: Path, shared: bool, wait: bool, waits: Waits) -> Iterator[bool]
 
 def _claim(path: Path) -> bool:
     """Make a lock file with this process as its owner; false where there is one."""
+    pid, descriptor = os.getpid(), None
     try:
         descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW, 0o666)
+        with os.fdopen(descriptor, "w") as file:
+            json.dump(_Owner(socket.gethostname(), pid, _start_time(pid))._asdict(), file)
     except FileExistsError:
         return False
     except OSError as error:
+        if descriptor is not None:  # a file without an owner is no lock
+            path.unlink(missing_ok=True)
         raise SpaceError(f"{path}: cannot be written: {error.strerror}") from error
-    with os.fdopen(descriptor, "w") as file:
-        pid = os.getpid()
-        json.dump(_Owner(socket.gethostname(), pid, _start_time(pid))._asdict(), file)
     return True
 
 

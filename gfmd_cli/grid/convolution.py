@@ -44,10 +44,10 @@ class PaddedTransform:
     """The exchange between the processes that share the fields; None for one process."""
 
     def __post_init__(self) -> None:
-        self.rows, self.columns = (1, *self.shape)[-2:]
+        self.field_rows, self.field_columns = (1, *self.shape)[-2:]
         self.padded_rows, self.padded_columns = (1, *self.padded)[-2:]
         self.real = np.dtype(np.float64 if self.precision == "double" else np.float32)
-        self.own_rows, self.span = self.rows, (0, self.padded_columns // 2 + 1)
+        self.own_rows, self.span = self.field_rows, (0, self.padded_columns // 2 + 1)
         if self.transposition is not None:
             self.own_rows, self.span = self.transposition.row_count, self.transposition.span
         self.local_rows = LocalRows(self.own_rows, self.threads)
@@ -70,17 +70,22 @@ class PaddedTransform:
 
         Raises ValueError where the padding is less than twofold.
         """
-        if self.padded_rows < 2 * self.rows - 1 or self.padded_columns < 2 * self.columns - 1:
+        if (
+            self.padded_rows < 2 * self.field_rows - 1
+            or self.padded_columns < 2 * self.field_columns - 1
+        ):
             raise ValueError("a convolution needs twice the points")
-        kernel = kernel.reshape(self.own_rows, self.columns)
+        kernel = kernel.reshape(self.own_rows, self.field_columns)
         transforms, symbol = self._transforms, np.empty(self.symbol_shape, self.real)
         values, work = transforms.values, transforms.work
-        values[:, : self.columns] = kernel
-        values[:, self.columns :] = 0.0
-        values[:, self.padded_columns - self.columns + 1 :] = kernel[:, :0:-1]
+        values[:, : self.field_columns] = kernel
+        values[:, self.field_columns :] = 0.0
+        values[:, self.padded_columns - self.field_columns + 1 :] = kernel[:, :0:-1]
 
         def mirror(columns: Columns) -> None:
-            columns.coefficients[self.padded_rows - self.rows + 1 :] = work[:0:-1, columns.part]
+            columns.coefficients[self.padded_rows - self.field_rows + 1 :] = work[
+                :0:-1, columns.part
+            ]
             columns.forward()
             symbol[:, columns.part] = columns.coefficients[: len(symbol)].real
 
@@ -91,8 +96,8 @@ class PaddedTransform:
     def apply(self, symbol: Field, field: Field, out: Field) -> Field:
         """out <- F^-1 symbol F field; return it. `out` may be `field`."""
         values = self._transforms.values
-        values[:, : self.columns] = field.reshape(self.own_rows, self.columns)
-        values[:, self.columns :] = 0.0
+        values[:, : self.field_columns] = field.reshape(self.own_rows, self.field_columns)
+        values[:, self.field_columns :] = 0.0
         mirrored = symbol[(self.padded_rows - 1) // 2 : 0 : -1]
 
         def multiply(columns: Columns) -> None:
@@ -101,15 +106,15 @@ class PaddedTransform:
 
         self._transforms.filter(multiply)
         scale = 1.0 / (self.padded_rows * self.padded_columns)
-        target = out.reshape(self.own_rows, self.columns)
-        np.multiply(values[:, : self.columns], scale, out=target)
+        target = out.reshape(self.own_rows, self.field_columns)
+        np.multiply(values[:, : self.field_columns], scale, out=target)
         return out
 
     @cached_property
     def _transforms(self) -> FieldTransforms:
         """The transforms of the padded fields, and their memory."""
         modes, (first, last) = self.padded_columns // 2 + 1, self.span
-        sizes = self.own_rows * modes, self.rows * (last - first)  # as rows, as columns
+        sizes = self.own_rows * modes, self.field_rows * (last - first)  # as rows, as columns
         kind = np.result_type(self.real, np.complex64)
         memory = [pyfftw.empty_aligned(max(sizes), kind)]
         if self.transposition is not None:

@@ -9,6 +9,7 @@ from dataclasses import dataclass, fields
 from functools import cached_property
 from itertools import pairwise
 from typing import Any
+from weakref import proxy
 
 import numpy as np
 import pyfftw
@@ -50,7 +51,8 @@ class DistributedGrid(Grid):
     @cached_property
     def rows(self) -> DistributedRows:
         """The rows of this process."""
-        return DistributedRows(self.ranks, self.points_y, self._threads, lambda: self._memory[1])
+        grid = proxy(self)  # a cycle of references would keep the memory of a grid that is done
+        return DistributedRows(self.ranks, self.points_y, self._threads, lambda: grid._memory[1])
 
     @cached_property
     def spans(self) -> list[Span]:

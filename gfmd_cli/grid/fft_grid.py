@@ -187,7 +187,7 @@ class Grid:
         return values
 
     @property
-    def pair_count(self) -> int:
+    def pair_cost(self) -> int:
         """Cost of a pair of transforms of this grid, in transforms in double precision."""
         return 2 if self.precision == "double" else 1
 

@@ -1,4 +1,6 @@
-"""Plans of Fourier transforms: measured once and stored; or estimated, which gives the same plans.
+"""Plans of Fourier transforms: measured once and stored, or estimated.
+
+Estimated plans are the same in every run without being stored.
 
 FFTW's wisdom (what it has measured) is stored as text: beside the study of a run, so that a resumed
 run uses the plans of the first one, and in the user's cache for other runs. One process at a time
@@ -32,7 +34,7 @@ from gfmd_cli.files.locks import AS_LONG_AS_NEEDED, Waits, locked
 from gfmd_cli.files.regular import read_regular
 
 T = TypeVar("T")
-Plan = Callable[..., Any]
+Planner = Callable[..., Any]
 """Makes a plan on one thread from source, target, axes and direction."""
 Wisdom = dict[str, list[str]]
 """Texts in double and in single precision by the key of a group of transforms."""
@@ -55,11 +57,16 @@ def fast_length(points: float) -> int:
 
 @cache
 def processor() -> str:
-    """The model name of the processor: a plan measured on one is a bad one on another."""
+    """The model name of the processor: a plan measured on one is a bad one on another.
+
+    Without a name (ARM), the numbers of the vendor and the model.
+    """
     with suppress(OSError):
-        for line in Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines():
-            if line.startswith("model name"):
-                return line.partition(":")[2].strip()
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+        for keys in (("model name",), ("CPU implementer", "CPU part")):
+            found = [line.partition(":")[2].strip() for line in lines if line.startswith(keys)]
+            if found:
+                return " ".join(dict.fromkeys(found))
     return platform.processor()
 
 
@@ -133,7 +140,7 @@ def plans() -> str:
     return f"measured {_digest(known) if known else ''}".strip()
 
 
-def planned_transforms(make: Callable[[Plan], T], size: int = 0) -> T:
+def planned_transforms(make: Callable[[Planner], T], size: int = 0) -> T:
     """The transforms that `make` plans. Plans that are not known yet are measured and stored.
 
     The time limit of a measurement increases with the number of grid points, `size`.
@@ -150,7 +157,7 @@ def planned_transforms(make: Callable[[Plan], T], size: int = 0) -> T:
         return _measured(key, make, fftw)
 
 
-def _key(make: Callable[[Plan], Any]) -> str:
+def _key(make: Callable[[Planner], Any]) -> str:
     """The key of a group of transforms: of the layout and axes of all arrays that it transforms."""
     problems: list[str] = []
 
@@ -166,7 +173,7 @@ def _key(make: Callable[[Plan], Any]) -> str:
     return hashlib.sha256("\n".join(problems).encode()).hexdigest()[:16]
 
 
-def _by_wisdom(texts: list[str], make: Callable[[Plan], T], fftw: Plan) -> T:
+def _by_wisdom(texts: list[str], make: Callable[[Planner], T], fftw: Planner) -> T:
     """The transforms that `make` plans, from their wisdom. Raises RuntimeError if it lacks one."""
     pyfftw.forget_wisdom()
     double, single = texts
@@ -174,7 +181,7 @@ def _by_wisdom(texts: list[str], make: Callable[[Plan], T], fftw: Plan) -> T:
     return make(partial(fftw, flags=("FFTW_MEASURE", "FFTW_WISDOM_ONLY")))
 
 
-def _measured(key: str, make: Callable[[Plan], T], fftw: Plan) -> T:
+def _measured(key: str, make: Callable[[Planner], T], fftw: Planner) -> T:
     """The transforms that `make` plans, measured unless another process has measured them."""
     of_study = _planning.get().folder
     folder = of_study or cache_folder()

@@ -21,7 +21,7 @@ import numpy as np
 import pyfftw
 
 from gfmd_cli.grid.arrays import Field, Modes
-from gfmd_cli.grid.plans import Plan, planned_transforms
+from gfmd_cli.grid.plans import Planner, planned_transforms
 from gfmd_cli.grid.rows import LocalRows
 from gfmd_cli.grid.transposition import Transposition
 
@@ -43,7 +43,7 @@ class RowTransforms:
     rows : the threads, and the rows that each transforms
     """
 
-    def __init__(self, values: Field, lines: Modes, rows: LocalRows, fftw: Plan) -> None:
+    def __init__(self, values: Field, lines: Modes, rows: LocalRows, fftw: Planner) -> None:
         self.values, self.lines, self.pool = values, lines, rows.pool
         arrays = [(values[a:b], lines[a:b]) for a, b in rows.parts]
         self._forward = [fftw(v, c, (1,), "FFTW_FORWARD").execute for v, c in arrays]
@@ -105,7 +105,7 @@ class ColumnTransforms:
     length : number of rows to which the columns are padded by zeros
     """
 
-    def __init__(self, work: Modes, rows: LocalRows, fftw: Plan, length: int) -> None:
+    def __init__(self, work: Modes, rows: LocalRows, fftw: Planner, length: int) -> None:
         self.work, self.pool = work, rows.pool
         count, columns = len(rows.parts), work.shape[1]
         is_large = work.nbytes >= MIN_COPIED_BYTES * count and len(work) > 1
@@ -210,7 +210,7 @@ class FieldTransforms:
         self._transposition = transposition
         self._arrays = self.lines, self.work, memory[-1].view(self.work.dtype)
 
-        def make(fftw: Plan) -> tuple[RowTransforms, ColumnTransforms]:
+        def make(fftw: Planner) -> tuple[RowTransforms, ColumnTransforms]:
             length = padded_rows or len(self.work)
             along_columns = ColumnTransforms(self.work, rows, fftw, length)
             return RowTransforms(self.values, self.lines, rows, fftw), along_columns

@@ -16,7 +16,7 @@ AXIS_NAMES = {
     **dict.fromkeys(("y", "lat", "latitude"), "y"),
 }
 EVEN_TOLERANCE = 1e-3  # deviation of equal distances, over their mean; a choice
-NO_VARIABLE = b"This is a netCDF dimension but not a netCDF variable"  # begins the attribute NAME
+NO_VARIABLE = "This is a netCDF dimension but not a netCDF variable"  # begins the attribute NAME
 UNIT_NAMES = ("units", "unit")
 NO_UNITS = ("", "1")
 LENGTHS = {
@@ -49,12 +49,17 @@ class Axis(NamedTuple):
 
 def stated_unit(data: Any) -> str:
     """The unit that a dataset states, "" where it states none."""
-    for name in UNIT_NAMES:
-        unit = data.attrs.get(name, "")
-        text = unit.decode(errors="replace") if isinstance(unit, bytes) else str(unit)
-        if text.strip() not in NO_UNITS:
-            return text.strip()
-    return ""
+    units = (_text(data.attrs.get(name, "")) for name in UNIT_NAMES)
+    return next((unit for unit in units if unit not in NO_UNITS), "")
+
+
+def _text(value: Any) -> str:
+    """An attribute as text; many programs write an array of one element."""
+    if getattr(value, "shape", ()) is None:  # h5py.Empty
+        return ""
+    words = np.ravel(value).tolist()
+    texts = (each.decode(errors="replace") if isinstance(each, bytes) else each for each in words)
+    return " ".join(map(str, texts)).strip()
 
 
 def in_metres(unit: str) -> float | None:
@@ -81,7 +86,7 @@ def axis_of(file: Any, dimension: Any) -> Axis:
     scale = dimension[0]  # `dimension.values()` crashes on a scale that is damaged
     name = scale.name.strip("/")
     label = name.rpartition("/")[-1]
-    is_empty = bytes(scale.attrs.get("NAME", b"")).startswith(NO_VARIABLE)
+    is_empty = _text(scale.attrs.get("NAME", "")).startswith(NO_VARIABLE)
     if is_empty or scale.dtype.kind not in "iuf" or scale.ndim != 1 or scale.size < 2:
         return Axis(label, None, None)
     stored = take(file, name, MAX_COMPRESSION)[()]

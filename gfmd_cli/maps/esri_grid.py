@@ -1,6 +1,7 @@
 """ESRI ASCII grids: number and size of the cells in a header, and rows from north to south."""
 
 import re
+from itertools import accumulate
 from pathlib import Path
 
 import numpy as np
@@ -30,11 +31,28 @@ def read_esri_grid(path: Path, dataset: str | None) -> HeightMap:
             raise InputError(f"the header of an ESRI grid has no {' and no '.join(absent)}")
         shape = int(header["nrows"]), int(header["ncols"])
         check_layout(shape, np.dtype(float))
-        heights = np.loadtxt((line, *file), ndmin=2)
-    if heights.shape != shape:
-        raise InputError(f"{extent(heights.shape)} heights, but the header states {extent(shape)}")
+        lines = list(filter(np.size, (np.array(each.split(), float) for each in (line, *file))))
+    _check_rows([len(each) for each in lines], *shape)
+    heights = np.concatenate(lines).reshape(shape)
     missing = header.get("nodata_value", NO_DATA)
     sides = tuple(header["cellsize"] * points for points in shape)
     heights = np.ma.masked_equal(heights, missing)
     notes = (warning,) if warning else ()
     return HeightMap(heights=heights, sides=sides, source="ESRI grid", periodic=False, notes=notes)
+
+
+def _check_rows(counts: list[int], rows: int, columns: int) -> None:
+    """Raise InputError where lines of so many heights are not the rows that the header states.
+
+    A row may have several lines. Where rows and columns are interchanged, lines may seem to be such
+    parts of rows.
+    """
+    ends, is_even = set(accumulate(counts)), len(set(counts)) == 1
+    is_turned = is_even and (len(counts), counts[0]) == (columns, rows) != (rows, columns)
+    if (
+        is_turned
+        or sum(counts) != rows * columns
+        or not ends.issuperset(range(columns, sum(counts), columns))
+    ):
+        found = extent((len(counts), counts[0])) if is_even else f"{sum(counts)}"
+        raise InputError(f"{found} heights, but the header states {extent((rows, columns))}")

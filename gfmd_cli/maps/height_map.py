@@ -49,13 +49,13 @@ class HeightMap:
     source: str
     """Format, and dataset or channel."""
     metres: bool = False
-    """Whether the sides and distances are in metres, not in an unknown unit."""
+    """Whether the sides are in metres, not in an unknown unit."""
     metric_heights: bool = False
     """Whether the heights are in metres, not in an unknown unit."""
     periodic: bool | None = None
     """Whether the map is periodic, None where the file does not state it."""
     notes: tuple[str, ...] = ()
-    """Warnings about what the file states and the reader does not use."""
+    """Warnings of the reader."""
 
 
 def check_type(dtype: np.dtype[Any]) -> None:

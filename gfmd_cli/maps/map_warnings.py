@@ -1,6 +1,6 @@
 """Warnings about probable mistakes in the use of a measured map.
 
-Each function returns a warning, or "" if what its docstring describes does not occur.
+Each public function returns a warning, or "" without one.
 """
 
 import warnings
@@ -56,9 +56,9 @@ MIN_LINES = 32  # fewer lines and points per line have such shifts by chance
 
 
 def given_side(key: str, length: float, stated: float | None, topography: Topography) -> str:
-    """A side [m], given by a key of the surface, other than the one that the file states.
+    """Warn if a side [m] that a key of the surface gives is not the one that the file states.
 
-    Without a stated one, a side that is that of a part of the map.
+    If the file states none, warn if the side is that of a part of the map.
     """
     axis = 0 if key == "length_y" else -1
     part, whole = topography.heights.shape[axis], topography.shape[axis]
@@ -74,7 +74,10 @@ def given_side(key: str, length: float, stated: float | None, topography: Topogr
 
 
 def unknown_side(topography: Topography, scale: float, length: float | None) -> str:
-    """No side, or one of unknown unit; a factor of the heights multiplies it, to `length` [m]."""
+    """Warn if the file states no side, or one without unit.
+
+    `length` [m] is the stated side times `scale`, None without one.
+    """
     if length is None:
         return "the file does not state its side in metres; L = 1 m is assumed: set surface.length"
     if topography.metres:
@@ -91,7 +94,10 @@ def unknown_side(topography: Topography, scale: float, length: float | None) -> 
 
 
 def unit_of_heights(topography: Topography, scale: float) -> str:
-    """A factor of heights that are in metres, or none where only the sides are in metres."""
+    """Warn if `scale` multiplies heights that are in metres already.
+
+    Warn, too, if heights without unit stand beside sides in metres, and there is no factor.
+    """
     if topography.metric_heights and scale != 1.0:
         return "the file states the unit of its heights: surface.scale multiplies metres"
     if scale != 1.0 or not topography.metres or topography.metric_heights:
@@ -103,7 +109,7 @@ def unit_of_heights(topography: Topography, scale: float) -> str:
 
 
 def many_filled_in(topography: Topography) -> str:
-    """Many missing heights, all of them filled in."""
+    """Warn if many heights were missing and have been filled in."""
     fraction = topography.missing_count / topography.heights.size
     if fraction <= MAX_FILLED:
         return ""
@@ -114,7 +120,7 @@ def many_filled_in(topography: Topography) -> str:
 
 
 def missing_ends(topography: Topography) -> str:
-    """Ends of a line profile that are missing, and have no height on one side to fill them in."""
+    """Warn if heights at the ends of a line profile are missing, with known ones on one side."""
     if topography.missing is None or topography.heights.ndim == 2:
         return ""
     first, last = (int(np.argmin(ends)) for ends in (topography.missing, topography.missing[::-1]))
@@ -127,7 +133,7 @@ def missing_ends(topography: Topography) -> str:
 
 
 def unlikely_gradient(heights: Field, spacing: tuple[float, ...]) -> str:
-    """Heights and spacing [m] that make an unlikely gradient."""
+    """Warn if heights and spacing [m] make an unlikely gradient."""
     slopes = (np.diff(heights, axis=i) / step for i, step in enumerate(spacing))
     gradient = np.sqrt(sum(float(np.mean(slope**2)) for slope in slopes))
     if not (gradient > MAX_GRADIENT or 0 < gradient < MIN_GRADIENT):
@@ -139,10 +145,11 @@ def unlikely_gradient(heights: Field, spacing: tuple[float, ...]) -> str:
 
 
 def unresolved(factor: float, period_limit: float = 0.0) -> str:
-    """Roughness with shorter waves than the map has; from `surface_spectrum.short_wave_factor`.
+    """Warn if the surface seems to have shorter waves than the map.
 
-    `period_limit` is the lateral period limit of the microscope, or the length of two points if
-    that is longer [m]; 0 if it is not known.
+    `factor` is that of `surface_spectrum.short_wave_factor`. `period_limit` is the lateral period
+    limit of the microscope, or the length of two points if that is longer [m]; 0 if it is not
+    known.
     """
     if not factor > MAX_SHORT_WAVE_FACTOR:
         return ""
@@ -166,7 +173,7 @@ def unresolved(factor: float, period_limit: float = 0.0) -> str:
 
 
 def step_at_border(heights: Field, *, is_tapered: bool) -> str:
-    """Opposite borders of a repeated map that do not fit."""
+    """Warn if opposite borders of a repeated map do not fit."""
     axes = range(heights.ndim)
     ends = [np.ravel(heights.take(0, axis) - heights.take(-1, axis)) for axis in axes]
     inside = np.mean([np.mean(np.diff(heights, axis=axis) ** 2) for axis in axes])
@@ -181,7 +188,7 @@ def step_at_border(heights: Field, *, is_tapered: bool) -> str:
 
 
 def tilted(heights: Field) -> str:
-    """A tilt from which nothing is subtracted."""
+    """Warn if the heights, from which nothing is subtracted, are tilted."""
     tilt = 1 - float(np.var(level(heights, "plane")) / (np.var(heights) or 1.0))
     if tilt <= MAX_TILT:
         return ""
@@ -192,7 +199,7 @@ def tilted(heights: Field) -> str:
 
 
 def curved(heights: Field) -> str:
-    """A parabolic form, which has a kink at the borders if it is repeated."""
+    """Warn if the map has a parabolic form, with a kink at the borders where it is repeated."""
     if min(heights.shape) < MIN_FORM_POINTS[heights.ndim]:
         return ""
     heights = heights[tuple(slice(None, None, 1 + n // FORM_POINTS) for n in heights.shape)]
@@ -211,9 +218,9 @@ def curved(heights: Field) -> str:
 
 
 def steep(levelling: str, subtracted: Field, sides: tuple[float, ...]) -> str:
-    """A slope that levelling subtracts, in heights [m] at the corners of a map of these sides [m].
+    """Warn if levelling subtracts a steep slope: heights are not along the normal of the plane.
 
-    Heights are then not measured along the normal of the plane.
+    `subtracted` has the heights [m] that it subtracts at the corners of a map of these sides [m].
     """
     steps = [np.diff(subtracted, axis=axis).mean() for axis in range(subtracted.ndim)]
     slope = float(np.hypot.reduce(np.divide(steps, sides)))
@@ -227,12 +234,13 @@ def steep(levelling: str, subtracted: Field, sides: tuple[float, ...]) -> str:
 
 
 def repeated_lines(heights: Field) -> str:
-    """Some lines of a map, each equal to the line before it."""
+    """Warn if some lines of a map are equal to the line before them."""
     for lines, along in ((heights, "x"), (heights.T, "y")) if heights.ndim == 2 else ():
         equal = 1 + np.flatnonzero((lines[1:] == lines[:-1]).all(axis=1))
         if not 0 < equal.size < len(lines) - 1:
             continue
-        checked = equal[:: 1 + equal.size // CHECKED_LINES]
+        checked = equal[(equal > 1) & (equal < len(lines) - 1)]
+        checked = checked[:: 1 + checked.size // CHECKED_LINES]
         is_varied = any(2 * np.unique(lines[i]).size >= lines.shape[1] for i in checked)
         if is_varied and not any(_is_mirror(lines, i) for i in checked):
             return (
@@ -243,8 +251,10 @@ def repeated_lines(heights: Field) -> str:
 
 
 def _is_mirror(lines: Field, i: int) -> bool:
-    """Whether a map is mirrored between the lines i - 1 and i."""
-    return np.array_equal(lines[i + 1 : i + 3], lines[i - 3 : i - 1][::-1])
+    """Whether a map is mirrored between the lines i - 1 and i: one line beyond them, or two."""
+    beyond = min(2, i - 1, len(lines) - i - 1)
+    is_same = np.array_equal(lines[i + 1 : i + 1 + beyond], lines[i - 1 - beyond : i - 1][::-1])
+    return is_same and not np.array_equal(lines[i], lines[i + 1])
 
 
 def _kink(heights: Field, axis: int) -> float:
@@ -255,7 +265,7 @@ def _kink(heights: Field, axis: int) -> float:
 
 
 def shifted_lines(topography: Topography, spacing: tuple[float, ...]) -> str:
-    """Lines of a scan that have offsets of their own, all of them or some.
+    """Warn if lines of a scan have offsets of their own, all of them or some.
 
     `spacing` is that of the map [m]. An offset is the median difference to the line before, where
     both halves of the line agree on it.
@@ -318,7 +328,7 @@ def _seam(medians: Field) -> float:
 
 
 def outliers(topography: Topography) -> str:
-    """Equal heights farther from all others than these are from each other, or many at a limit."""
+    """Warn if equal heights are farther from all others than these are apart, or at a limit."""
     heights = topography.heights
     if topography.missing is not None:
         heights = heights[~topography.missing]
@@ -349,7 +359,7 @@ def outliers(topography: Topography) -> str:
 
 
 def _often_equal(heights: Field) -> str:
-    """A height within the range that is far more frequent than any other."""
+    """Warn if a height within the range is far more frequent than any other."""
     sample = heights.flat[:: 1 + heights.size // SAMPLE_SIZE]
     values, counts = np.unique(sample, return_counts=True)
     order = np.argsort(counts)
@@ -366,7 +376,7 @@ def _often_equal(heights: Field) -> str:
 
 
 def single_points(topography: Topography) -> str:
-    """Single points far above or below all their neighbours, or strokes along one axis."""
+    """Warn if single points, or strokes along one axis, are far above or below their neighbours."""
     is_map, singles, strokes = topography.heights.ndim == 2, 0, np.zeros((2, 2), int)
     parts: list[Any] = [...]
     if is_map:
@@ -414,7 +424,7 @@ def _usual_difference(topography: Topography) -> float:
 
 
 def _spikes(heights: Field) -> str:
-    """A few heights beyond a gap wider than the range of the others, at least `MIN_OTHERS`."""
+    """Warn if a few heights lie beyond a gap wider than the range of the others (`MIN_OTHERS`)."""
     most = max(0, min(MAX_SPIKES, heights.size // 4, heights.size - MIN_OTHERS))
     values = np.partition(heights, (most, -most - 1), axis=None)
     low, high = np.sort(values[: most + 1])[::-1], np.sort(values[-most - 1 :])
@@ -435,7 +445,7 @@ def _spikes(heights: Field) -> str:
 
 
 def rounded(topography: Topography, scale: float) -> str:
-    """Heights in steps as coarse as the differences of neighbours along the rougher axis."""
+    """Warn if heights have steps as coarse as differences of neighbours along the rougher axis."""
     heights, smallest = topography.heights, np.inf
     pairs, changes = np.zeros((2, heights.ndim), int)
     for rows in row_blocks(heights):
@@ -457,7 +467,7 @@ def rounded(topography: Topography, scale: float) -> str:
 
 
 def rounded_trend(topography: Topography, levelled: Field, scale: float) -> str:
-    """Levelled heights [m] that are to a large part the rounding of what was subtracted.
+    """Warn if levelled heights [m] are to a large part the rounding of what was subtracted.
 
     Equal neighbours do not show it, because the trend makes them different.
     """

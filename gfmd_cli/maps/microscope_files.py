@@ -6,7 +6,7 @@ import warnings
 from codecs import BOM_UTF8
 from dataclasses import replace
 from io import BytesIO
-from math import log2
+from math import inf, log2
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -155,14 +155,12 @@ def _in_known_form(file: BinaryIO, start: bytes) -> BinaryIO:
 
     The comment of TrueMap ends with a zero, but the reader takes one of 24 bytes for granted.
     """
-    file.seek(0)
     if start.startswith(TRUEMAP) and (end := start.find(b"\0", TRUEMAP_MAGIC_BYTES) + 1):
-        rest = file.read()[end:]
-        return BytesIO(start[:TRUEMAP_MAGIC_BYTES] + bytes(TRUEMAP_COMMENT_BYTES) + rest)
+        header = start[:TRUEMAP_MAGIC_BYTES] + bytes(TRUEMAP_COMMENT_BYTES)
+        return BytesIO(header + text_tables.part(file, end))
     if start.startswith(MOUNTAINSMAP) and MICROMETRES.search(start):
-        content = file.read()
         header = MICROMETRES.sub(lambda unit: b"\xb5m".ljust(len(unit[0]), b"\0"), start)
-        return BytesIO(header + content[len(start) :])
+        return BytesIO(header + text_tables.part(file, len(start)))
     return file
 
 
@@ -194,11 +192,11 @@ def _read_channel(path: Path, file: BinaryIO, reader: Any, dataset: str | None) 
         _check_is_own_netcdf(reader)
     stored = channel.topography(physical_sizes=(1.0,) * len(shape) if unsized else None)
     scan = stored if stored.unit is None else stored.to_unit("m")
-    lines = text_tables.header(file, (1, *shape[1:])[-1]) if kind == "asc" else []
+    lines = text_tables.lines_above(file, (1, *shape[1:])[-1]) if kind == "asc" else []
     if kind == "asc" and len(shape) == 2:
         _check_matrix(file, scan, unsized)
         _check_nova(lines)
-        _check_wyko(_header(channel))
+        _check_wyko(_metadata(channel))
     heights, sides = heights_and_sides(scan, rows_along_y)
     if kind == "nms":
         sides = _nanofocus_sides(file, shape)
@@ -310,6 +308,8 @@ def _cut_off(shape: tuple[int, ...], sides: tuple[float, ...]) -> str:
 
     Scans may have fewer lines than points per line, but then a half, a quarter, ... of them.
     """
+    if not all(0 < side < inf for side in sides):
+        return ""  # refused later
     along_y, along_x = (side / points for side, points in zip(sides, shape, strict=True))
     octaves = log2(along_y / along_x)
     if abs(octaves - round(octaves)) < MAX_OFF_SQUARE:
@@ -320,7 +320,7 @@ def _cut_off(shape: tuple[int, ...], sides: tuple[float, ...]) -> str:
     )
 
 
-def _header(channel: Any) -> dict[str, Any]:
+def _metadata(channel: Any) -> dict[str, Any]:
     """The keys and values of the header of a text table."""
     header = (channel.info or {}).get("raw_metadata")
     return header if isinstance(header, dict) else {}
@@ -345,7 +345,7 @@ def _check_sides(channel: Any) -> None:
 
     The reader takes the unit of the heights as that of the sides, which is seldom true.
     """
-    sides, header = channel.physical_sizes or (), _header(channel)
+    sides, header = channel.physical_sizes or (), _metadata(channel)
     is_bare = "xunit" in header and not header["xunit"] and not header.get("yunit")
     if len(sides) == 2 and is_bare and header.get("zunit"):
         raise InputError(
@@ -362,13 +362,13 @@ def _check_sides(channel: Any) -> None:
 
 def _sides_with_unit(channel: Any, sides: tuple[float, ...]) -> tuple[float, ...] | None:
     """The sides [m] of a text table whose header states units of them but not of the heights."""
-    header = _header(channel)
+    header = _metadata(channel)
     unit_x = header.get("xunit") or ""  # which is not a known unit
     units = (header.get("yunit") or unit_x, unit_x)[-len(sides) :]
-    factors = [in_metres(unit) for unit in units]
-    if None in factors:
+    factors = [factor for factor in map(in_metres, units) if factor is not None]
+    if len(factors) < len(units):
         return None
-    return tuple(factor * side for factor, side in zip(factors, sides, strict=True) if factor)
+    return tuple(factor * side for factor, side in zip(factors, sides, strict=True))
 
 
 def check_all_are_heights(table: Field, *, unsized: bool) -> None:

@@ -1,7 +1,8 @@
 """Signs of a map whose numbers were read or saved wrongly: type, byte order, order of the lines.
 
-Each function returns a warning, or "" if what its docstring describes does not occur. The limits
-lie between the values of sound and of damaged maps (`docs/map_evidence.md`).
+Each public function returns a warning, or "" if what its docstring describes does not occur;
+`filled_lines` also returns the map. The limits lie between the values of sound and of damaged maps
+(`docs/map_evidence.md`).
 """
 
 from dataclasses import replace

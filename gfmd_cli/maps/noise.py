@@ -11,7 +11,7 @@ from gfmd_cli.units import labelled
 
 RATIOS = (2, 3)  # of distances; a choice: gratings resemble noise at one of them only
 TOLERANCE = 0.15  # relative, of white noise at these distances; roughness grows by 0.25 for H = 0.1
-FAR = 4  # a quarter of a line is a distance at which longer waves are seen; a choice
+FAR = 4  # second differences over 1 / FAR of a line show whether there are longer waves; a choice
 MIN_GROWTH = 0.1
 """Relative growth of the mean square up to this distance; a choice. Without longer waves, the
 roughness itself is as short as the noise."""

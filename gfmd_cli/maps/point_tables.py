@@ -65,7 +65,7 @@ def read_points(file: BinaryIO) -> HeightMap | None:
         return None
     if count == 3 and _is_numbered(table):
         table, count = table[:, 1:], 2
-    order, factors = _header(lines[:first], count)
+    order, factors = _order_and_units(lines[:first], count)
     table = table[:, order]
     if not np.isfinite(table[:, :-1]).all():
         raise InputError("a position in the table is missing or infinite")
@@ -129,7 +129,7 @@ def _is_numbered(table: Field) -> bool:
     return bool(np.ptp(table[:, 1]) > 0 and _steps(table[:, 1:2], indices)[1] <= MAX_DEVIATION)
 
 
-def _header(lines: list[bytes], count: int) -> tuple[list[int], list[float | None]]:
+def _order_and_units(lines: list[bytes], count: int) -> tuple[list[int], list[float | None]]:
     """The places of x, y and height among the columns, and metres per unit of each of these.
 
     There are no factors if no unit is stated. Raises InputError for an unknown unit, and where some
@@ -145,15 +145,15 @@ def _header(lines: list[bytes], count: int) -> tuple[list[int], list[float | Non
         is_complete = len(of_columns) == count
         if is_complete and any(of_columns):
             units = of_columns
-        is_unclear = not is_complete and any(in_metres(unit) for unit in of_columns)
+        is_unclear |= not is_complete and any(in_metres(unit) for unit in of_columns)
     units = [units[place] for place in order if units]
     if stated := dict(UNITS_OF_GWYDDION.findall("\n".join(texts))):
-        units, is_unclear = [stated.get("Lateral", "")] * (count - 1), False
-        units.append(stated.get("Value", ""))
-    if is_unclear or "" in units[:-1]:
+        units = [*[stated.get("Lateral", "")] * (count - 1), stated.get("Value", "")]
+    if "" in units[:-1] or (is_unclear and not units):
+        example = "x [um] y [um] z [nm]" if count == 3 else "x [um] z [nm]"
         raise InputError(
             f"the header of the table states units, but not one for each of the {count} "
-            "columns, as 'x [um] z [nm]' does: add them, or remove the header"
+            f"columns, as {example!r} does: add them, or remove the header"
         )
     return order, [factor("the header of the table", unit) for unit in units]
 

@@ -24,7 +24,7 @@ MAX_WINDOWS = 32  # of a file; those of a larger one leave gaps
 SCANNED_BYTES = 2**26  # in which a row of another length is looked for; a choice
 HEADER_LINES = 200  # that may differ from the table: as many as SurfaceTopography skips
 SAMPLE_BYTES = 2**16  # at the end of each window; a choice
-MIN_DIGIT_FRACTION = 0.2  # of the characters of a table, most of which are digits; a choice
+MIN_DIGIT_FRACTION = 0.2  # smallest fraction of digits among the characters of a table; a choice
 GRID_LINES = 20_000  # whose positions are compared; a choice
 SIZE_BYTES = 100  # of a line with two numbers
 MATRIX_COLUMNS = 4  # fewer are positions: the rule of SurfaceTopography
@@ -109,7 +109,7 @@ def sides_in(lines: list[bytes]) -> list[float]:
     return [float(value) * unit for value, unit in sides if is_number(value) and unit is not None]
 
 
-def header(file: BinaryIO, width: int) -> list[bytes]:
+def lines_above(file: BinaryIO, width: int) -> list[bytes]:
     """The lines above the first row of so many numbers, without empty ones."""
 
     def is_above(line: bytes) -> bool:
@@ -164,7 +164,9 @@ def shorter_or_longer_row(file: BinaryIO) -> str:
 
 
 def with_blanks(file: BinaryIO) -> tuple[BinaryIO, str]:
-    """A matrix with commas or semicolons as one between blanks, and decimal commas as points.
+    """A matrix whose numbers are separated by commas or semicolons, rewritten with blanks.
+
+    Decimal commas become points.
 
     A comma between two digits is a decimal one where blanks or semicolons separate the numbers.
     Any other file is returned as it is: the readers of positions know commas and semicolons.
@@ -192,7 +194,7 @@ def with_blanks(file: BinaryIO) -> tuple[BinaryIO, str]:
             numbers = columns(file, b",")
         if is_decimal:
             rows = list(filter(is_numeric, whole))
-            warning = _warning_of_thousands(start, numbers)
+            warning = _warning_of_thousands(rows, numbers)
         if is_decimal or numbers >= MATRIX_COLUMNS:
             text = part(file).replace(b";", b" ")
             file = BytesIO(text.replace(b",", b"." if is_decimal else b" "))
@@ -244,15 +246,14 @@ def _has_empty_cells(rows: list[bytes], separator: bytes) -> bool:
     return len(patterns) > 1
 
 
-def _warning_of_thousands(start: bytes, width: int) -> str:
+def _warning_of_thousands(rows: list[bytes], width: int) -> str:
     """Warning if each number of a table has a comma where it could separate thousands.
 
     One number such as 0,125 or 1,5 shows that the commas are decimal. Raises InputError if only
     some of the numbers have such a comma, as where it separates thousands.
     """
-    lines = [line for line in start.splitlines() if is_numeric(line)]
-    rows = [re.split(rb"[\s;]+", line.strip(b" \t;")) for line in lines]
-    numbers = [word for row in rows if len(row) == width for word in row if word[-1:].isdigit()]
+    cells = [re.split(rb"[\s;]+", row.strip(b" \t;")) for row in rows]
+    numbers = [word for row in cells if len(row) == width for word in row if word[-1:].isdigit()]
     with_comma = [word for word in numbers if b"," in word]
     if not with_comma or not all(map(THOUSANDS.fullmatch, with_comma)):
         return ""
@@ -272,9 +273,9 @@ def _warning_of_points(rows: list[bytes]) -> str:
     Where they are decimal, some number has another number of decimals.
     """
     words = [row.split() for row in rows] or [[]]
-    columns = zip(*(row for row in words if len(row) == len(words[-1])), strict=True)
+    cells = zip(*(row for row in words if len(row) == len(words[-1])), strict=True)
     pointed, whole = [], []
-    for column in columns:
+    for column in cells:
         with_point = [word for word in column if b"." in word]
         if 0 < len(with_point) < len(column):
             pointed += with_point
@@ -300,13 +301,14 @@ def in_utf8(file: BinaryIO) -> BinaryIO:
     end = part(file, max(0, file.seek(0, os.SEEK_END) - WINDOW_BYTES))
     is_plain = start.isascii() and b'"' not in start and end.isascii()
     is_plain = is_plain and not OLD_LINE_END.search(start)
-    is_table = start.startswith((*UTF_16, codecs.BOM_UTF8))
+    is_utf_16 = _is_utf_16(start)
+    is_table = is_utf_16 or start.startswith(codecs.BOM_UTF8)
     if not (is_plain or is_table or start.startswith(LATIN_1)):
         is_table = columns(file) > 0 or columns(file, b" \t;") > 0  # also with decimal commas
     if not is_table:
         return file
     content = part(file).removeprefix(codecs.BOM_UTF8)
-    if start.startswith(UTF_16):
+    if is_utf_16:
         content = content.decode("utf-16").encode()
     try:
         content.decode()
@@ -320,11 +322,20 @@ def in_utf8(file: BinaryIO) -> BinaryIO:
     return BytesIO(OLD_LINE_END.sub(b"\n", content).replace(b'"', b""))
 
 
+def _is_utf_16(start: bytes) -> bool:
+    """Whether the start of a file is text in UTF-16: mostly ASCII, and without zeros.
+
+    Others begin with the same two bytes, such as 16-bit heights of which the first is -2 or -257.
+    """
+    text = start.decode("utf-16", "replace") if start.startswith(UTF_16) else "\0"
+    return "\0" not in text and 2 * len(text.encode("ascii", "ignore")) > len(text)
+
+
 def columns(file: BinaryIO, separators: bytes = b" \t,;") -> int:
     """Columns of a table of numbers between separators, 0 for any other file.
 
-    All lines have the same number of them, but for lines with words, which are headers, and a last
-    line that is cut short.
+    All lines after the first `HEADER_LINES` have this number, or, of a file with fewer lines, the
+    last complete one. Lines with words do not count.
     """
     blanks = bytes.maketrans(separators, b" " * len(separators))
     width = 0
@@ -344,7 +355,10 @@ def columns(file: BinaryIO, separators: bytes = b" \t,;") -> int:
 
 
 def _windows(file: BinaryIO) -> Iterator[tuple[int, bytes]]:
-    """Position and whole lines of parts of a file; a line of more than a window has no content."""
+    """Position and whole lines of parts of a file.
+
+    It stops with one zero byte at a line longer than a window.
+    """
     size = file.seek(0, os.SEEK_END)
     gap = max(0, size // MAX_WINDOWS - WINDOW_BYTES)
     position = 0

@@ -85,15 +85,20 @@ def blunted(
             "but the valleys are, as if scanned by a tip of about this radius. Then the tip has"
         )
     distance = _distance_of_blunt_peaks(axes, MAX_CURVATURE / radius)
-    length = 2 * distance * max(spacing)
+    length = 2 * distance * min(spacing)
     if distance == 1 or cutoff >= FILTERED_LENGTHS * length:
         return ""
-    shortest = ROUNDED_UP * FILTERED_LENGTHS * length
+    shape = topography.heights.shape
+    shortest = f"{ROUNDED_UP * FILTERED_LENGTHS * length:.2g}"
+    remedy = (
+        f"With surface.s_filter = {shortest} or more the contact hardly depends on the tip, but is "
+        "that of a smoother surface"
+    )
+    if float(shortest) > min(n * step for n, step in zip(shape, spacing, strict=True)):
+        remedy = "The map is too small for an S-filter against that"
     return (
         f"{what} blunted structures shorter than about {length:.2g} m: the contact area at light "
-        "load is too large, in tests by a factor of 1.1 to 3.5. With surface.s_filter = "
-        f"{shortest:.2g} or more the contact hardly depends on the tip, but is that of a smoother "
-        "surface"
+        f"load is too large, in tests by a factor of 1.1 to 3.5. {remedy}"
     )
 
 
@@ -128,15 +133,18 @@ def _curvature_of_tip(axes: list[_Profiles]) -> float:
 
 
 def _distance_of_blunt_peaks(axes: list[_Profiles], curvature: float) -> int:
-    """The shortest distance, in points, at which peaks have at most this curvature [1/m].
+    """The shortest distance at which peaks have at most this curvature [1/m].
 
-    The longest one that is compared, if peaks are sharper at all of them. The curvature is that
-    along the axis with the sharper peaks.
+    In points of the axis with the smaller spacing. The longest distance that is compared, if peaks
+    are sharper at all of them. The curvature is that along the axis with the sharper peaks.
     """
-    points = min(profiles.heights.shape[1] for profiles in axes)
-    distance, longest = 1, max(1, int(MAX_DISTANCE * points))
+    smallest = min(profiles.spacing for profiles in axes)
+    steps = [profiles.spacing / smallest for profiles in axes]
+    side = min(p.heights.shape[1] * step for p, step in zip(axes, steps, strict=True))
+    distance, longest = 1, max(1, int(MAX_DISTANCE * side))
     while distance < longest:
-        if not max(_curvatures(profiles, distance)[1] for profiles in axes) > curvature:
+        points = [max(1, round(distance / step)) for step in steps]
+        if not max(sharper for _, sharper, _ in map(_curvatures, axes, points)) > curvature:
             break
         distance = min(max(distance + 1, round(GROWTH * distance)), longest)
     return distance

@@ -1,4 +1,14 @@
-"""Height maps and line profiles from files as surfaces: reading, preparation, heights on grids."""
+"""Height maps and line profiles from files as surfaces: reading, preparation, heights on grids.
+
+How a map goes on beyond its borders follows from two keys, `periodic` and `edges`:
+
+    periodic  edges         _is_repeated  has_borders  _is_reflected  is_mirrored
+    true      None, "none"  yes           no           no             no
+    false     None          no            yes          yes            yes
+    false     "none"        no            no           yes            yes
+    either    "mirror"      no            no           no             yes
+    either    "window"      no            no           no             no
+"""
 
 from math import comb
 from typing import Annotated, Any, ClassVar, Literal, Self
@@ -336,7 +346,7 @@ class FileSurface(RigidSurface):
 
     def tapered_map(self) -> "FileSurface | None":
         """The map with tapered edges, scaled to its own power; None where it is periodic."""
-        if self.edges != "mirror" and not self._is_reflected():
+        if not self.is_mirrored:
             return None
         return TaperedMap.model_construct(**dict(self) | {"edges": "window"})
 
@@ -441,7 +451,8 @@ class FileSurface(RigidSurface):
                 self.edges == "window"
             ),
             "mirrored to twice the side": self.edges == "mirror",
-            "periodic": self.edges in (None, "none") and not is_free and not self.has_borders,
+            "periodic": self._is_repeated() and not is_free,
+            "repeated as it is": self.edges == "none" and not self._is_periodic() and not is_free,
             f"interpolation on finer grids: {self.applied_interpolation()}": True,
         }
         return ", ".join(step for step, applies in steps.items() if applies)
@@ -530,15 +541,15 @@ def _warnings_on_heights(surface: FileSurface) -> tuple[str, ...]:
     unfilled = levelled if topography.missing is None else surface._levelled()
     subtracted = scale * topography.heights[corners] - unfilled[corners]
     sides = tuple(step * (n - 1) for step, n in zip(spacing, shape, strict=True))
-    filled_lines, known = misread.filled_lines(topography)
-    outliers, misread_map = map_warnings.outliers(known), misread.misread(known)
-    points = "" if misread_map or outliers else map_warnings.single_points(known)
-    lines = "" if misread_map else map_warnings.shifted_lines(known, spacing)
+    filled_lines, sound = misread.filled_lines(topography)
+    outliers, misread_map = map_warnings.outliers(sound), misread.misread(sound)
+    points = "" if misread_map or outliers else map_warnings.single_points(sound)
+    lines = "" if misread_map else map_warnings.shifted_lines(sound, spacing)
     rounded = map_warnings.rounded(topography, scale)
     rounded_trend = map_warnings.rounded_trend(topography, levelled, scale)
     cutoff, is_flipped = surface.s_filter or 0.0, surface.flip
-    tip = blunted(known, spacing, scale, surface.tip_radius, cutoff=cutoff, flipped=is_flipped)
-    unresolved_noise = noise_beyond(known, spacing, surface.period_limit(), cutoff)
+    tip = blunted(sound, spacing, scale, surface.tip_radius, cutoff=cutoff, flipped=is_flipped)
+    unresolved_noise = noise_beyond(sound, spacing, surface.period_limit(), cutoff)
     is_explained = any((outliers, misread_map, points, lines, rounded, rounded_trend))
     return (
         filled_lines,
@@ -546,7 +557,7 @@ def _warnings_on_heights(surface: FileSurface) -> tuple[str, ...]:
         misread_map,
         points,
         lines,
-        "" if is_explained else unresolved_noise or noisy(known, spacing, scale, cutoff),
+        "" if is_explained else unresolved_noise or noisy(sound, spacing, scale, cutoff),
         "" if misread_map else tip,
         map_warnings.curved(levelled),
         map_warnings.steep(surface.levelling(), subtracted, sides),

@@ -139,7 +139,7 @@ class PeriodicSolve(LocalSolve):
         values = grid.padded[..., : grid.points]
         self.tiles.put(self.s, values)
         grid.unfilter_padded(self.contact.stiffness, self.tiles.blocks)
-        self.transforms += grid.pair_count
+        self.transforms += grid.pair_cost
         return values
 
     def start(self, tolerance: float) -> Start:
@@ -161,7 +161,7 @@ class PeriodicSolve(LocalSolve):
         values = moves.padded[..., : moves.points]  # in the memory of the displacement
         tiles.put(change, values)
         moves.filter_padded(contact.stiffness, tiles.blocks)
-        self.transforms += moves.pair_count
+        self.transforms += moves.pair_cost
         sigma = self.grid.empty()
         sigma[...] = values
         tiles.overwrite(self.s + tiles.take(values), sigma)

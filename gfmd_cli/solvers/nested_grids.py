@@ -127,7 +127,7 @@ def _with_pressed_laid(
     rounding = contact.lay_pressed(state.u, state.sigma, state.residual)
     if rounding == 0:
         return state, Status.CONVERGED
-    pair, rounding = contact.grid_of_moves.pair_count, hypot(state.rounding, rounding)
+    pair, rounding = contact.grid_of_moves.pair_cost, hypot(state.rounding, rounding)
     transforms = state.coarser_transforms + state.transforms + pair
     state = solver.begin_from(Start(contact, pair, state.u, state.sigma, rounding))
     state.coarser_transforms = transforms

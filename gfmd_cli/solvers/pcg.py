@@ -236,7 +236,7 @@ class _Run:
 
     def apply_stiffness(self) -> float:
         """Replace the values in `padded` by K times them; return the sum of their products."""
-        self.state.transforms += self.moves.pair_count
+        self.state.transforms += self.moves.pair_cost
         return self.moves.filter_padded(self.contact.stiffness)
 
     def advance(self, beta: float) -> None:

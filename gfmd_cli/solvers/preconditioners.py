@@ -50,7 +50,7 @@ class GreensFunction:
         self.grid, self.rows = grid, contact.grid.rows
         self.stiffness, self.screening = contact.stiffness, screening
         self.z = grid.as_rows(grid.padded)
-        self.transforms = grid.pair_count
+        self.transforms = grid.pair_cost
 
     def apply(
         self, sigma: Field, contact_state: ContactState, threshold: int, change: Field

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from gfmd_cli.errors import InputError, Interrupted, SpaceError, StudyError
-from gfmd_cli.files.atomic import check_place, new_file
+from gfmd_cli.files.atomic import check_place, new_file, target_of
 from gfmd_cli.files.checksums import Version, file_version
 from gfmd_cli.files.hdf5 import new_hdf5
 from gfmd_cli.files.locks import AS_LONG_AS_NEEDED, Waits, locked
@@ -46,7 +46,7 @@ class Study:
 
     def __init__(self, path: Path, waits: Waits = AS_LONG_AS_NEEDED) -> None:
         self._waits = waits
-        self.path = Path(os.path.realpath(path)) if path.is_symlink() else path
+        self.path = target_of(path)
         if self.path.is_symlink():
             raise InputError(f"{path}: a symbolic link that leads to itself")
         if not self.path.name:
