@@ -213,7 +213,7 @@ def _on_map(doubled: Grid, values: Any, grid: Grid) -> Any:
 
 
 SCENES: dict[str, Callable[..., Scene]] = {"periodic": build_scene, "free": build_free_scene}
-"""How a scene is built, by the boundary of the map."""
+"""How a scene is built, by `grid.boundary`."""
 
 
 def doubled_grid(grid: Grid) -> Grid:

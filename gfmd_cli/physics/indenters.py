@@ -64,7 +64,7 @@ class RigidSurface(SpecTable):
     rough: ClassVar[bool] = False
     """Whether the surface is random or measured; error bars then use its spectrum."""
     x_first: ClassVar[float] = 0.0
-    """Position of the first grid point along each axis / L."""
+    """Position of the first grid point along each axis, over the side of the cell."""
     is_map: ClassVar[bool] = False
     """Whether the surface is a map, whose points are those of the smallest grid."""
     band_limited: ClassVar[bool] = False

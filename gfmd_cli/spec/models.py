@@ -150,7 +150,7 @@ OneOrMany = (
     | Annotated[list[T], Key(min_length=1, max_length=MAX_VALUES), Tag("list")]
 )
 Share = Annotated[float, Key(gt=0, lt=1)]
-Pressures = Annotated[OneOrMany[Positive] | Annotated[Ladder, Tag("ladder")], Discriminator(_shape)]
+Values = Annotated[OneOrMany[Positive] | Annotated[Ladder, Tag("ladder")], Discriminator(_shape)]
 Areas = Annotated[
     OneOrMany[Share],
     Discriminator(
@@ -195,17 +195,17 @@ class LoadTable(SpecTable):
     contact_area takes no sequence.
     """
 
-    p_star: Pressures | None = None
+    p_star: Values | None = None
     """Reduced pressures p / Delta_sigma, from 1e-30 to 1e6."""
-    pressure: Pressures | None = None
+    pressure: Values | None = None
     """Pressures [Pa]."""
     contact_area: Areas | None = None
     """Relative contact areas a_r: in the continuum if the spec has a table [accuracy], otherwise
     on the grid. The program searches the pressures."""
-    mean_gap: Pressures | None = None
+    mean_gap: Values | None = None
     """Mean gaps u_g / h_std: in the continuum if the spec has a table [accuracy], otherwise on the
     grid. The program searches the pressures."""
-    displacement: Pressures | None = None
+    displacement: Values | None = None
     """Displacements [m] of the indenter from first touch, on the grid; for a free boundary or an
     elastomer whose k(0) is not zero. The program searches the pressures."""
     tolerance: Share = 1e-3
