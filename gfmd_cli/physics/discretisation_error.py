@@ -446,7 +446,7 @@ def _stress(grids: NestedGrids, scales: RoughnessScales | None, tip: Tip) -> Est
     """Stress deviation: at the edge of a patch the stress is as (1 - r^2/a^2)^(1 - n/2)."""
     fine, coarse, n = grids
     if n > MAX_STRESS_EXPONENT:
-        return replace(UNKNOWN, verdict=Verdict.DIVERGES if n >= 3 else Verdict.SLOW)
+        return replace(UNKNOWN, verdict=Verdict.DIVERGES if n >= DIVERGENT else Verdict.SLOW)
     if scales is None:
         return _single_stress(grids, tip) if coarse else UNKNOWN
     value, edge_ratio = fine.sigma_p, fine.switches_per_point / fine.a_r

@@ -90,7 +90,7 @@ class FreeElasticity:
     @property
     def preconditioner_transforms(self) -> float:
         """Cost of `approximate_stress`, whose single precision takes half of the time, likewise."""
-        return 1.0 * prod(self._preconditioner[0].padded) / self.grid.size
+        return prod(self._preconditioner[0].padded) / self.grid.size
 
 
 @dataclass(frozen=True)

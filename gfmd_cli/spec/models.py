@@ -217,10 +217,10 @@ class LoadTable(SpecTable):
         loads = [name for name in LOADS if getattr(self, name) is not None]
         if len(loads) != 1:
             raise ValueError(f"give one of {', '.join(LOADS)}")
-        low, high = PRESSURE_RANGE
-        beyond = [p for p in self.listed() if not low <= p <= high]
-        if beyond and self.p_star is not None:
-            raise ValueError(f"p_star must be from {low:g} to {high:g}, got {beyond[0]:g}")
+        if self.p_star is not None:
+            low, high = PRESSURE_RANGE
+            if beyond := [p for p in self.listed() if not low <= p <= high]:
+                raise ValueError(f"p_star must be from {low:g} to {high:g}, got {beyond[0]:g}")
         if "tolerance" in self.model_fields_set and not LOADS[loads[0]].searched:
             searched = [name for name, load in LOADS.items() if load.searched]
             raise ValueError(f"tolerance belongs to {' or '.join(searched)}")
