@@ -131,6 +131,8 @@ def test_round_indenters_measure_distances_in_metres(points):
 def test_a_punch_without_rim_in_the_short_side_is_refused():
     with pytest.raises(ValueError, match=r"leaves no rim in a cell of 0\.4"):
         Punch(radius=0.25, length_y=0.4)
+    with pytest.raises(InputError, match=r"points_y: .* 16 .*leaves no rim in a cell of 0\.25"):
+        Punch(radius=0.25).on_cell(64, 16)
 
 
 SHAPES = [((64, 64), 1.0), ((48, 30), 0.4), ((31, 49), 2.0), ((27, 27), 1.0), ((16, 50), 1.0)]

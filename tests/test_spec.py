@@ -225,6 +225,14 @@ def test_task_ids_do_not_depend_on_the_output(read):
             ("[0.1, 1.0]", "{from=0.1, to=1, per_decade=1e-308}"),
             ["load.p_star.per_decade", "greater than or equal to 0.001", "1e-308"],
         ),
+        (
+            ("p_star = [0.1, 1.0]", "pressure = {from=1e-60, to=1e60, per_decade=1000}"),
+            ["load.pressure: a sequence of 120001 values; at most 100000 are allowed"],
+        ),
+        (
+            ("[grid]", f"[output]\nfields = {5 * ['u']}\n[grid]"),
+            ["output.fields: must have at most 4 values, got ['u', "],
+        ),
         (("[study]", "surface = 3\n[study]"), ["TOML syntax"]),
         (("[study]", "x" + ".x" * 5000 + " = 1\n[study]"), ["5000 dots in a line"]),
         (("[study]", "x = {x" + ".x" * 5000 + " = 1}\n[study]"), ["5000 dots in a line"]),

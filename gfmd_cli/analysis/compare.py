@@ -273,7 +273,10 @@ def load_of(row: Row) -> tuple[str, str]:
 
 
 def theory_of(theory: Theory, spectrum: Shells, n: float) -> Persson:
-    """A theory of a spectrum and the exponent n of k(q); where n is NaN, the local exponent."""
+    """A theory of a spectrum and the exponent n of k(q); where n is NaN, the local exponent.
+
+    That needs two shells: the fitted mean gap of a single wave is NaN where n is.
+    """
     if theory == "coarse-grained":
         return CoarseGrained(spectrum)
     if theory == "fitted":

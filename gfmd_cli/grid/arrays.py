@@ -16,6 +16,9 @@ SingleField: TypeAlias = NDArray[np.float32]
 Modes: TypeAlias = NDArray[np.complexfloating[Any, Any]]
 """Fourier coefficients in the half-spectrum layout of a real transform."""
 
+Integers: TypeAlias = NDArray[np.integer[Any]]
+"""Labels, counts, indices of points, displacements in cells."""
+
 Mask: TypeAlias = NDArray[np.bool_]
 """True at chosen grid points."""
 

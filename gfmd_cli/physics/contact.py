@@ -23,10 +23,10 @@ from gfmd_cli.physics.persson import Shells
 from gfmd_cli.physics.waves import Texture, texture
 
 PRESSURE_RANGE = (1e-30, 1e6)
-"""Reduced pressures that are solved. Above 2^17, the largest number of points per side, every grid
-is in full contact, as |K h| exceeds its rms value by that factor at most; sigma - p then only loses
-digits. Far below the lower limit squares of p* underflow; rounding errors of sigma exceed p* much
-earlier."""
+"""Reduced pressures that are solved. Above 2^17 every grid is in full contact, and sigma - p only
+loses digits: the maximum of |K h| on N x N points is at most N times its rms value, and N <= 2^17.
+Far below the lower limit squares of p* underflow; rounding errors of sigma exceed p* much earlier.
+"""
 UNCERTAINTY_FACTOR = 2.0
 """Factor of the rms of min(g, sigma) below which gaps and stresses may be errors.
 
@@ -43,7 +43,7 @@ class Contact:
     """Contact problem of a scene at one pressure."""
 
     boundary: ClassVar[str] = "periodic"
-    """The boundary of the map: what `grid.boundary` is."""
+    """What `grid.boundary` is."""
     grid: Grid
     height: Field
     """Indenter h, shape `grid.shape`, zero mean; filled in where it is unknown."""
@@ -150,7 +150,8 @@ class Contact:
         Contact is u = h to the last bit. The residual contains only the gap of such a point.
         A point is laid if its stress is larger than the error of sigma and stays compressive when
         this point alone is laid. `residual` is the natural residual of u and sigma. Returns the
-        estimate of what the rounding of the change of sigma adds to it, 0 if no point was laid.
+        estimate of what the rounding of the change of sigma adds to the residual, 0 if no point was
+        laid.
         """
         error = UNCERTAINTY_FACTOR * residual * min(self.pressure, 1.0)
         moves = self.grid_of_moves

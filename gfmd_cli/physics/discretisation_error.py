@@ -62,23 +62,24 @@ PLATE_BAR, PLATE_FLOOR = 0.6, 0.2
 #   AREA_CHANGE D                                  what neither explains; D of the corrected values
 # A = area / L^2, N = points per L. Chosen on seeds 20 and 47 (full), 11 (--quick --shift 1.37).
 AREA_CHANCE, AREA_LAW, AREA_CHANGE = 0.5, 0.01, 0.3
-# Of other surfaces, from two grids, the last two terms are SMOOTH_AREA_LAW (n + 1) xi, for surfaces
-# that are not band-limited and for oblong pixels KINKED_AREA_LAW (n + 1) xi, and
-# IRREGULAR_AREA_CHANGE D. On these surfaces the ratio of the excess to n xi is between 0.05 and
-# LINE_EXCESS, which it has where edges run along rows or columns. Chosen on --maps 20, 101, 102,
-# 103, --free 20, 101, --shapes 20 and --maps 300 with scans; checked on other seeds
-# (docs/calibration.md).
+# AREA_LAW and AREA_CHANGE are those of isotropic band-limited roughness. Other surfaces, from two
+# grids, have IRREGULAR_AREA_CHANGE D, and the law SMOOTH_AREA_LAW (n + 1) xi, or
+# KINKED_AREA_LAW (n + 1) xi if they are not band-limited or the pixels are oblong. The ratio of
+# their excess to n xi is between 0.05 and LINE_EXCESS, its value where edges run along rows or
+# columns. Chosen on --maps 20, 101, 102, 103, --free 20, 101, --shapes 20 and --maps 300 with
+# scans; checked on other seeds (docs/calibration.md).
 SMOOTH_AREA_LAW, KINKED_AREA_LAW, IRREGULAR_AREA_CHANGE = 0.04, 0.08, 1.5
 MAX_EXCESS_ANISOTROPY = 8.0
-"""Ratio of rms slopes up to which that holds. Beyond it 98 of 100 bars would hold, but only 84
+"""Ratio of rms slopes up to which these bars are used. Beyond it 98 of 100 would hold, but only 84
 beyond a ratio of 25 (`scripts/calibration.py --beyond`)."""
 MAX_KINKED_EXPONENT = 2.0
-"""Exponent n up to which that holds for surfaces that are not band-limited: at 2.5, 80 of 100 bars
+"""Exponent n up to which surfaces that are not band-limited have these bars: at 2.5, 80 of 100 bars
 of scans would hold, and errors are up to 8 times the bar (`--beyond`)."""
-# Of a line profile it is LINE_CHANCE xi over the root of the A N xi edges, or of the number of
-# independent waves if less; the standard deviation is 12^(-1/2) = 0.29. A gap of w_g points has the
-# error LINE_GAP u_g / w_g^2 in u_g, over the root of the number of gaps; also with a free boundary.
-# Chosen by `scripts/line_bars.py`, seeds 0 to 29 (with --free 0 to 19); checked on others.
+# Line profiles have, in place of the first two terms, LINE_CHANCE xi over the root of the A N xi
+# edges, or of the number of independent waves if less; with 12^(-1/2) = 0.29 as the factor this is
+# the standard deviation. A gap of w_g points has the error LINE_GAP u_g / w_g^2 in u_g, over the
+# root of the number of gaps; also with a free boundary. Chosen by `scripts/line_bars.py`, seeds 0
+# to 29 (with --free 0 to 19); checked on others.
 LINE_CHANCE, LINE_GAP = 0.75, 2.0
 EXPONENT_CHANGE = 0.6  # of its change with q is uncertain; chosen on --layers, seeds 1 and 2
 MAX_STRESS_EXPONENT = 2.5  # sigma_p converges as spacing^(3 - n): too slow for larger n
@@ -92,14 +93,15 @@ MAX_STRESS_EXPONENT = 2.5  # sigma_p converges as spacing^(3 - n): too slow for 
 # Error bars on one grid: SINGLE_GRID times that. On two grids: TWO_GRIDS times the root of the sum
 # of the squares of TYPICAL_WEIGHT times the typical error and of the change D from the coarser
 # grid, reduced by the order of convergence. 98.2 to 100 of 100 bars hold in the fitted half of the
-# set. Here a_r is that of a single or line contact, with SINGLE_CONTACT_AREA xi.
+# set. Here a_r is that of a single indenter, in one or two dimensions, with
+# SINGLE_CONTACT_AREA xi.
 SINGLE_GRID = {"a_r": 4.2, "sigma_p": 4.1, "u_g": 4.2}
 TWO_GRIDS = {"a_r": 0.4, "sigma_p": 1.4, "u_g": 2.2}
 TYPICAL_WEIGHT = {"a_r": 8.0, "sigma_p": 1.2, "u_g": 1.2}
 GAP_ORDER = 3.0  # of u_g on a rough surface; sigma_p: 3 - n, at most 2; a_r: D as it is
 MIN_EXPONENT = 0.5  # n below which bars no longer decrease: the error at n = 0 is random
 SINGLE_CONTACT = 2.5  # bar of a single indenter over D / (2^order - 1), from the calibration set
-SINGLE_CONTACT_AREA = 0.2  # error of a corrected a_r in xi, of a single or line contact, likewise
+SINGLE_CONTACT_AREA = 0.2  # error of a corrected a_r in xi, of a single indenter, likewise
 SINGLE_CONTACT_STRESS = 0.07  # in n sigma_p xi / a_r: waves at n = 2 have up to 0.07 where D = 0
 MAX_EDGE_RATIO = 1.5  # xi / a_r of a single contact beyond which sigma_p has no bar: few points
 SINGLE_CONTACT_GAP = 5.0  # in u_g / [points (1 - a_r)]^2: smooth indenters have 3.8 at most
@@ -265,7 +267,7 @@ def excess_exponent(elastomer: LinearElastomer, points: float, length: float) ->
 
 
 def estimate(
-    levels: Sequence[GridValues],
+    contacts: Sequence[GridValues],
     exponent: float,
     scales: RoughnessScales | None = None,
     area_exponent: ExcessExponent | None = None,
@@ -279,8 +281,8 @@ def estimate(
 
     Parameters
     ----------
-    levels : one contact at one pressure on grids N, N/2, ... in any order, all of which resolve the
-        surface; the two finest are used
+    contacts : one contact at one pressure on grids N, N/2, ... in any order, all of which resolve
+        the surface; the two finest are used
     exponent : local exponent of the stiffness at the highest wavenumber of the finest grid
     scales : scales of a rough surface. None for a single indenter: the errors of many
         patches then do not average out, and one grid gives no error of sigma_p and u_g
@@ -290,7 +292,7 @@ def estimate(
     tip : of a single indenter
     full_contact_errors : errors in full contact, of tensile stress between the points, by quantity
     """
-    ordered = sorted(levels, key=lambda level: level.points)
+    ordered = sorted(contacts, key=lambda contact: contact.points)
     coarse = ordered[-2] if len(ordered) > 1 else None
     grids = NestedGrids(ordered[-1], coarse, max(exponent, 0.0))
     fine, _, n = grids
@@ -444,7 +446,7 @@ def _stress(grids: NestedGrids, scales: RoughnessScales | None, tip: Tip) -> Est
     """Stress deviation: at the edge of a patch the stress is as (1 - r^2/a^2)^(1 - n/2)."""
     fine, coarse, n = grids
     if n > MAX_STRESS_EXPONENT:
-        return replace(UNKNOWN, verdict=Verdict.DIVERGES if n >= 3 else Verdict.SLOW)
+        return replace(UNKNOWN, verdict=Verdict.DIVERGES if n >= DIVERGENT else Verdict.SLOW)
     if scales is None:
         return _single_stress(grids, tip) if coarse else UNKNOWN
     value, edge_ratio = fine.sigma_p, fine.switches_per_point / fine.a_r
@@ -462,7 +464,7 @@ def _stress(grids: NestedGrids, scales: RoughnessScales | None, tip: Tip) -> Est
 
 
 def _single_stress(grids: NestedGrids, tip: Tip) -> Estimate:
-    """Stress deviation of a single indenter, or of a line contact."""
+    """Stress deviation of a single indenter, in one or two dimensions."""
     fine, _, n = grids
     value, edge_ratio = fine.sigma_p, fine.switches_per_point / fine.a_r
     if edge_ratio > MAX_EDGE_RATIO:
@@ -501,7 +503,7 @@ def _error_of_gaps(fine: GridValues) -> float:
 
 
 def _single_gap(grids: NestedGrids, tip: Tip) -> Estimate:
-    """Mean gap of a single indenter, or of a line contact."""
+    """Mean gap of a single indenter, in one or two dimensions."""
     fine, change = grids.fine, abs(grids.change("u_g"))
     points = fine.points * min(1.0, fine.area)  # along the shorter side
     across = fine.u_g / (points * (1 - fine.a_r)) ** 2  # points across the gap, in one line

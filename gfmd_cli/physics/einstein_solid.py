@@ -2,8 +2,8 @@
 
 Equation numbers are those of the paper: Mueser, "Elastic contacts of randomly rough surfaces across
 the spatial dimensions", Sect. 4.2. Every function but the first takes an array z = h_nc / h_std of
-any shape: minus the level of the non-contact zone above the mean height, heights being positive
-towards the elastomer, so that z rises with the pressure. Lengths are returned in units of h_std,
+any shape, z = (mean height - level of the non-contact zone) / h_std; heights are positive towards
+the elastomer, so that z rises with the pressure. Lengths are returned in units of h_std,
 stresses in k_0 h_std (which is Delta_sigma), energies per area in k_0 h_std^2.
 """
 
@@ -21,7 +21,8 @@ def non_contact_height(p_star: Field | float) -> Field:
     """Height z = h_nc / h_std of the non-contact zone at reduced pressure p / (k_0 h_std).
 
     Paper Eq. (38), corrected: p = k_0 <u(h_nc)>, solved for h_nc by Newton steps on ln <u>. This is
-    concave in z, so the steps rise to the root from any start below it. Minus infinity at p = 0.
+    concave in z: wherever the first step starts, it ends at or below the root, and the next ones
+    rise to it. Minus infinity at p = 0.
 
     Raises ValueError for a negative pressure.
     """

@@ -6,6 +6,7 @@ spatial dimensions".
 
 from collections.abc import Callable
 from functools import lru_cache
+from math import ceil
 from pathlib import Path
 from typing import Annotated, ClassVar, Literal, Self
 from warnings import catch_warnings
@@ -266,10 +267,12 @@ class Layer(LinearElastomer):
 
     def free_compliance(self, shape: Shape, spacings: Spacings, rows: slice = ALL_ROWS) -> Field:
         """Displacements [m/Pa]. Raises InputError for a layer that is far thinner than a pixel."""
-        if max(spacings) > MAX_SPACING * self.thickness:
+        spacing, largest = max(spacings), MAX_SPACING * self.thickness
+        if spacing > largest:
             raise InputError(
-                "elastomer.thickness, grid.points: the thickness is less than "
-                f"1/{MAX_SPACING:g} of the spacing"
+                f"elastomer.thickness, grid.points: the thickness is less than 1/{MAX_SPACING:g} "
+                f"of the spacing: {self.thickness:.3g} m given, pixels of {spacing:.3g} m; use "
+                f"{ceil(shape[-1] * spacing / largest)} points or more along x"
             )
         return super().free_compliance(shape, spacings, rows)
 

@@ -26,7 +26,8 @@ from gfmd_cli.status import ExplainedEnum
 FLOOR = {"a_r": 0.3, "sigma_p": 0.05, "u_g": 0.02}
 FACTOR = {"a_r": 1.6, "sigma_p": 2.2, "u_g": 1.5}
 MAX_EXPONENT = {"a_r": 2.5, "sigma_p": 1.0, "u_g": 3.0}
-"""Exponents n up to which 95 of 100 bars of every class hold; a_r: see `MAX_KINKED_EXPONENT`."""
+"""Exponents n up to which 95 of 100 bars of every class hold; those of a_r of surfaces that are not
+band-limited only to `discretisation_error.MAX_KINKED_EXPONENT`."""
 
 DIVERGENT = 3.0  # exponent n from which the stress has no finite variance
 FLAT_TOP_FACTOR, MAX_FLAT_TOP_EXPONENT = 4.0, 0.5
@@ -51,7 +52,7 @@ class GridValues:
     a_r: float
     """Relative contact area: fraction of the points that carry load."""
     sigma_p: float
-    """Standard deviation of the stress [Delta_sigma, or any unit that all levels share]."""
+    """Standard deviation of the stress [Delta_sigma, or any unit that all grids share]."""
     u_g: float
     """Mean gap [h_std]."""
     perimeter: float

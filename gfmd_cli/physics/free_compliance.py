@@ -25,7 +25,7 @@ from gfmd_cli.grid.arrays import Field
 from gfmd_cli.grid.fft_grid import Shape
 
 NEAR_SIDES = 64  # sides of a pixel within which the integral over it is in closed form
-FAR_NODES = 2  # of Gauss's rule along each side beyond: relative error below 1e-9 (tested)
+FAR_NODES = 2  # of Gauss's rule along each side beyond: relative error below 2e-9 (tested)
 SMALLEST_ARGUMENT = 1e-12  # (alpha r)^2, below which the smooth part is that at r = 0 to 1e-12
 
 Spacings = tuple[float, ...]

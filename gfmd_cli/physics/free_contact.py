@@ -90,7 +90,7 @@ class FreeElasticity:
     @property
     def preconditioner_transforms(self) -> float:
         """Cost of `approximate_stress`, whose single precision takes half of the time, likewise."""
-        return 1.0 * prod(self._preconditioner[0].padded) / self.grid.size
+        return prod(self._preconditioner[0].padded) / self.grid.size
 
 
 @dataclass(frozen=True)
@@ -213,7 +213,7 @@ def _on_map(doubled: Grid, values: Any, grid: Grid) -> Any:
 
 
 SCENES: dict[str, Callable[..., Scene]] = {"periodic": build_scene, "free": build_free_scene}
-"""How a scene is built, by the boundary of the map."""
+"""How a scene is built, by `grid.boundary`."""
 
 
 def doubled_grid(grid: Grid) -> Grid:

@@ -64,7 +64,7 @@ class RigidSurface(SpecTable):
     rough: ClassVar[bool] = False
     """Whether the surface is random or measured; error bars then use its spectrum."""
     x_first: ClassVar[float] = 0.0
-    """Position of the first grid point along each axis / L."""
+    """Position of the first grid point along each axis, over the side of the cell."""
     is_map: ClassVar[bool] = False
     """Whether the surface is a map, whose points are those of the smallest grid."""
     band_limited: ClassVar[bool] = False
@@ -339,10 +339,22 @@ class Punch(RoundIndenter):
 
     @model_validator(mode="after")
     def _has_rim(self) -> Self:
+        self._check_rim()
+        return self
+
+    def _check_rim(self) -> None:
         side = min(self.sides)
         if self.radius >= side / 2:
             raise ValueError(f"radius = {self.radius:g} leaves no rim in a cell of {side:g}")
-        return self
+
+    def on_cell(self, points: int, points_y: int) -> Self:
+        """See `RigidSurface.on_cell`. Raises InputError where the radius leaves no rim."""
+        surface = super().on_cell(points, points_y)
+        try:
+            surface._check_rim()
+        except ValueError as error:
+            raise InputError(f"grid.points_y: with {points_y} points, surface.{error}") from error
+        return surface
 
     def smallest_grid(self) -> int:
         """Smallest number of points along x: the radius is a spacing or more."""

@@ -13,16 +13,12 @@ percolates if two of its branches meet with different displacements.
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import ndimage
 
-from gfmd_cli.grid.arrays import Field, Mask
+from gfmd_cli.grid.arrays import Field, Integers, Mask
 
-Integers = NDArray[np.signedinteger[Any]]
-"""Integers: labels, counts, displacements in cells with one number per axis."""
 AREA_EDGES = np.logspace(-11.0, 0.0, 111)
 """Edges of the bins of patch areas [L^2, or L in a line contact]: ten per decade to 1.
 

@@ -246,7 +246,7 @@ class Persson:
         gap = self.mean_gap(p)
         known = gap > 0
         if not known.any():
-            return np.full(2, np.nan), np.copy  # of NaN, as nothing else is asked
+            return np.full(2, np.nan), np.copy  # any function: it is only called with NaN
         rising = -np.log(gap[known])
         return rising, monotone_cubic(rising, np.log(p[known]))
 

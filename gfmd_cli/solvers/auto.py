@@ -25,7 +25,7 @@ class Auto(Solver):
 
     def for_contact(self, contact: Contact) -> Solver:
         """The solver to use for this contact."""
-        flat = contact.boundary != Dual.boundary and is_flat(contact)
+        flat = contact.is_periodic and is_flat(contact)
         return _fastest(contact.boundary, flat)(**self.shared_keys())
 
     def fields_for(self, boundary: str, exponent: float | None) -> float:

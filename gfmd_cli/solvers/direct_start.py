@@ -35,9 +35,8 @@ from typing import Any
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
-from gfmd_cli.grid.arrays import Field, Mask, row_blocks
+from gfmd_cli.grid.arrays import Field, Integers, Mask, row_blocks
 from gfmd_cli.grid.compilation import kernel
 from gfmd_cli.grid.shared_transforms import BLOCK_ROWS
 from gfmd_cli.physics.contact import Contact
@@ -56,7 +55,6 @@ EXPECTED_GROWTH = 1.3  # of the sets: largest number of points over that of the 
 MAX_JOINING_FRACTION = 0.4  # of a set, that joins it at a time; measured: 0.3 to 0.6 are as good
 MAX_SETS = 60  # of the largest size, or eight times as many of half; a choice; 5 to 60 are taken
 
-Indices = NDArray[np.int64]
 Points = tuple[Any, ...]
 """Rows and columns of points, as indices of a field."""
 
@@ -245,7 +243,7 @@ class _DirectSolve:
 
 @kernel
 def _fill_lower_triangle(
-    matrix: Field, rows: Indices, columns: Indices, compliance: Field, height: int, width: int
+    matrix: Field, rows: Integers, columns: Integers, compliance: Field, height: int, width: int
 ) -> None:
     """Write the displacement at each point by a unit stress at it and at each point before it."""
     for a in range(rows.size):

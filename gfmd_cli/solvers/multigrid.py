@@ -49,7 +49,7 @@ from gfmd_cli.solvers.contact_state import ContactState
 MIN_LEVEL_POINTS = 4  # points along the shorter side on the coarsest level
 """With 2 and 8 the transforms are 0.96 to 1.06 times as many, with 16: 0.97 to 1.15 times:
 `multigrid.MIN_LEVEL_POINTS 2 8 16 --exponents 1 2 3 4`."""
-MAX_PIXEL_ASPECT = 1.5  # beyond, only the shorter side is coarsened, which leaves 1 / (2 / 1.5)
+MAX_PIXEL_ASPECT = 1.5  # beyond, only the shorter side is coarsened, to 3 : 4 at least
 """On pixels of 3 : 4 the transforms are 1.08 to 1.21 times as many with 1.1 or 1.3, the same with
 2.5: `multigrid.MAX_PIXEL_ASPECT 1.1 1.3 2.5 --aspect 1.3333 --points 96 192 --exponents 1 2 3`. On
 pixels of 1 : 2 with 2.5: 0.91 to 0.98 times at n = 1, 1.02 to 1.13 times at n = 2, 1.41 to 1.64
@@ -58,22 +58,24 @@ MAX_LAPLACIAN_GROWTH = 5.0  # growth of k(q) above which the Laplacian is square
 """If it is squared: 2 % fewer to 2 % more at n = 2, 4 to 7 % fewer at n = 2.2, where a step takes
 longer by as much; if it is not: 8 to 12 % more at n = 2.5, 18 to 38 % more at n = 3:
 `multigrid.MAX_LAPLACIAN_GROWTH 3 20 --exponents 2 2.2 2.5 3`."""
-PENALTY_STIFFNESS = 0.125, 0.25  # over diagonal element and k(2 q) / k(q): Laplacian, its square
-"""Half: 3 % fewer to 39 % more (n = 2); double: the same to 23 % more (n = 4):
+PENALTY_STIFFNESS = 0.125, 0.25  # of the Laplacian, of its square
+"""Penalty over the product of the diagonal element and the growth k(2 q) / k(q). Half: 3 % fewer to
+39 % more (n = 2); double: the same to 23 % more (n = 4):
 `multigrid.PENALTY_STIFFNESS "(0.0625, 0.125)" "(0.25, 0.5)" --exponents 1 2 3 4`."""
 JACOBI_EIGENVALUE = (1.04, 0.18), (1.76, 0.0)
-"""The largest of the damped Jacobi iteration: a + b k(2 q) / k(q), the smaller one. With 1.76 for
-all k the transforms are 1.19 to 1.48 times as many at n = 0.75 and 1, 1.00 to 1.02 times from
-n = 1.5 on; with 1.6 in place of 1.76: 1.02 to 1.11 times from n = 2 on, with 1.85: 0.93 to 1.00:
+"""The largest of the damped Jacobi iteration, as lines (a, b): at the growth g = k(2 q) / k(q) this
+is the smallest a + b g. With 1.76 for all k the transforms are 1.19 to 1.48 times as many at
+n = 0.75 and 1, 1.00 to 1.02 times from n = 1.5 on; with 1.6 in place of 1.76: 1.02 to 1.11 times
+from n = 2 on, with 1.85: 0.93 to 1.00:
 `multigrid.JACOBI_EIGENVALUE "((1.76, 0),)" "((1.04, 0.18), (1.6, 0))" "((1.04, 0.18), (1.85, 0))"
 --exponents 0.75 1 1.5 2 3 4`."""
 COARSE_WEIGHT = (0.55, 0.19), (1.16, -0.01)
-"""Of the correction by the next coarser level: a + b k(2 q) / k(q), the smaller one. With the
-weight 1 the transforms are 1.04 to 1.10 times as many at n = 0.75, 0.98 to 1.05 times at n = 1 to
-2: `multigrid.COARSE_WEIGHT "((1, 0),)" --exponents 0.75 1 1.5 2`; at p* = 0.001 and 0.003, 0.92 to
+"""Of the correction by the next coarser level, as lines (a, b) likewise. With the weight 1 the
+transforms are 1.04 to 1.10 times as many at n = 0.75, 0.98 to 1.05 times at n = 1 to 2:
+`multigrid.COARSE_WEIGHT "((1, 0),)" --exponents 0.75 1 1.5 2`; at p* = 0.001 and 0.003, 0.92 to
 1.15 times (`--p-star 0.001 0.003`); at n = 3, 0.99 to 1.02 times. At n = 4 the weight is 1; with
 1.12, 0.97 to 1.00 times: `"((1, 0),)" "((0.55, 0.19), (1.12, 0))" --exponents 3 4`."""
-STEEPEST = 4.5  # exponent above which the levels limit the growth of k(q); measured, see below
+STEEPEST = 4.5  # exponent above which the levels limit the growth of k(q): `_with_limited_growth`
 COARSEST_STEP_PAIRS = 4  # of smoothing steps on the coarsest level
 """With 1, 2 and 8, 4 % fewer to 5 % more:
 `multigrid.COARSEST_STEP_PAIRS 1 2 8 --exponents 1 2 3 4`."""

@@ -59,10 +59,11 @@ class PolonskyKeer(Solver):
 
     def begin(self, contact: Contact, u: Field) -> PolonskyKeerState:
         """Start from the compressive part of the stress that belongs to `u`."""
-        sigma = contact.stress(u, out=contact.grid.empty())
+        grid = contact.grid
+        sigma = contact.stress(u, out=grid.empty())
         pressure = contact.clear_untouchable(np.maximum(sigma, 0.0))
-        pressure *= contact.pressure / contact.grid.mean(pressure)
-        response = contact.grid.apply(compliance(contact), pressure, out=contact.grid.empty())
+        pressure *= contact.pressure / grid.mean(pressure)
+        response = grid.apply(compliance_symbol(contact), pressure, out=grid.empty())
         return PolonskyKeerState(
             u=u,
             sigma=sigma,
@@ -79,7 +80,7 @@ class PolonskyKeer(Solver):
         the residual, not for the method, and is not counted.
         """
         s, w, t, grid = state.pressure, state.response, state.direction, contact.grid
-        compute_displacement = partial(grid.apply, compliance(contact))
+        compute_displacement = partial(grid.apply, compliance_symbol(contact))
         gap, displacement = grid.empty(), grid.empty()
         while True:
             touching: Mask = s > 0
@@ -119,7 +120,7 @@ class PolonskyKeer(Solver):
             state.step += 1
 
 
-def compliance(contact: Contact) -> Field:
+def compliance_symbol(contact: Contact) -> Field:
     """1 / k(q), zero at q = 0."""
     k = contact.stiffness
     return np.divide(1.0, k, out=np.zeros_like(k), where=k > 0)

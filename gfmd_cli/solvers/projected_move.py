@@ -33,9 +33,9 @@ class MoveChoice(NamedTuple):
     """Whether the next direction is not conjugate to this one."""
 
 
-def choose(best: float, exact: bool) -> MoveChoice:
-    """The choice for a move; `exact`: no point is stopped before `best`."""
-    if exact:
+def choose(best: float, is_unclipped: bool) -> MoveChoice:
+    """The choice for a move; `is_unclipped`: no point is stopped before `best`."""
+    if is_unclipped:
         return MoveChoice(best, best, False)  # the exact step of conjugate gradients
     low, high = LENGTH_CHANGE
     is_full = best >= MIN_FULL_MOVE

@@ -21,13 +21,12 @@ from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache, partial
 from itertools import pairwise
 from math import prod
-from typing import Any, ClassVar, TypeAlias
+from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import gammainc, gammaincc
 
-from gfmd_cli.grid.arrays import Field
+from gfmd_cli.grid.arrays import Field, Integers
 from gfmd_cli.grid.convolution import PaddedTransform, padded_shape
 from gfmd_cli.grid.fft_grid import Grid, Shape
 from gfmd_cli.grid.shared_transforms import side_by_side
@@ -46,8 +45,6 @@ LARGEST_X = 4.0  # Q is below 1e-6 of its largest value there
 TABLE_SIZE = 4096  # values of Q: the error of linear interpolation is below 1e-6
 TILES_PER_CHUNK = 256  # tiles that a thread convolves at a time
 MIN_CELL_POINTS = 48  # per side of the cell on which kernels are computed; a choice
-
-Indices: TypeAlias = NDArray[np.integer[Any]]
 
 TileMap = Callable[[Field], Field]
 """Maps a field on tiles to another one."""
@@ -101,7 +98,7 @@ class TileOperators:
         """The map u -> K u on these tiles, with the kernel of K cut off at 8 points."""
         return convolution(self.stiffness, tiles, self.grid.rows.pool)
 
-    def _nodes(self, tiles: Tiles) -> Indices:
+    def _nodes(self, tiles: Tiles) -> Integers:
         """Numbers of the points of the coarse grid around each tile, shape (tiles, 25)."""
         down, right = self.transform.shape
         nodes = _nodes_of_tile() + self.first_node
@@ -192,7 +189,7 @@ def _smooth_part(contact: FreeContact, shape: Shape, step: int) -> Field:
     return kernel * (contact.free.unit / k_n * float(np.prod(grid.spacings)))
 
 
-def _nodes_of_tile() -> Indices:
+def _nodes_of_tile() -> Integers:
     """Points of the coarse grid whose splines overlap a tile, along one axis from its corner."""
     return np.arange(SIDE // COARSENING + SPLINE_ORDER - 1) - (SPLINE_ORDER // 2 - 1)
 

@@ -27,6 +27,7 @@ WORDS = {
     "path_type": "must be the name of a file",
     "model_type": "must be a table",
     "too_short": "must have {min_length} or more values",
+    "too_long": "must have at most {max_length} values",
 }
 """What is allowed, by the type of pydantic's error, where its message is not plain."""
 ESCAPED = re.compile(r"[\b\t\n\f\r]")

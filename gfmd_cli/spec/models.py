@@ -20,7 +20,7 @@ from gfmd_cli.physics.surfaces import Surface
 from gfmd_cli.solvers.auto import AnySolver
 from gfmd_cli.spec_table import Positive, SpecTable
 
-MAX_LADDER = 100_000  # pressures of one ladder; upper limit, guards against typing errors
+MAX_VALUES = 100_000  # of one list or ladder; upper limit, guards against typing errors
 MAX_DECADES = 300.0  # of which a power of ten does not overflow
 LADDER_ROUNDINGS = 8  # of a power of ten, by which a value of the ladder may lie above `to`
 SWEPT = ("surface", "elastomer", "grid", "solver")
@@ -115,15 +115,21 @@ class Ladder(SpecTable):
     def _rises(self) -> Self:
         if self.to < self.from_:
             raise ValueError(f"to = {self.to:g} lies below from = {self.from_:g}")
+        if (count := int(self._decades * self.per_decade) + 1) > MAX_VALUES:
+            raise ValueError(f"a sequence of {count} values; at most {MAX_VALUES} are allowed")
         return self
 
-    def pressures(self) -> list[float]:
-        """The pressures, rising."""
-        decades = float(np.log10(self.to) - np.log10(self.from_))  # the ratio can overflow
-        steps = int(decades * self.per_decade) + 1  # one may be missed by rounding
+    def values(self) -> list[float]:
+        """The values, rising."""
+        steps = int(self._decades * self.per_decade) + 1  # one may be missed by rounding
         values = [self._value(step / self.per_decade) for step in range(steps + 1)]
-        rounding = LADDER_ROUNDINGS * np.finfo(float).eps * (1 + np.log(10) * decades)
+        rounding = LADDER_ROUNDINGS * np.finfo(float).eps * (1 + np.log(10) * self._decades)
         return [value for value in values if value / self.to - 1 <= rounding]
+
+    @property
+    def _decades(self) -> float:
+        """Decades from the first value to the upper limit, whose ratio can overflow."""
+        return float(np.log10(self.to) - np.log10(self.from_))
 
     def _value(self, decades: float) -> float:
         """The value so many decades above the first one, at least 0; infinite where too large."""
@@ -141,10 +147,10 @@ def _shape(value: Any) -> str:
 T = TypeVar("T")
 OneOrMany = (
     Annotated[T, Tag("number")]
-    | Annotated[list[T], Key(min_length=1, max_length=MAX_LADDER), Tag("list")]
+    | Annotated[list[T], Key(min_length=1, max_length=MAX_VALUES), Tag("list")]
 )
 Share = Annotated[float, Key(gt=0, lt=1)]
-Pressures = Annotated[OneOrMany[Positive] | Annotated[Ladder, Tag("ladder")], Discriminator(_shape)]
+Values = Annotated[OneOrMany[Positive] | Annotated[Ladder, Tag("ladder")], Discriminator(_shape)]
 Areas = Annotated[
     OneOrMany[Share],
     Discriminator(
@@ -189,17 +195,17 @@ class LoadTable(SpecTable):
     contact_area takes no sequence.
     """
 
-    p_star: Pressures | None = None
+    p_star: Values | None = None
     """Reduced pressures p / Delta_sigma, from 1e-30 to 1e6."""
-    pressure: Pressures | None = None
+    pressure: Values | None = None
     """Pressures [Pa]."""
     contact_area: Areas | None = None
     """Relative contact areas a_r: in the continuum if the spec has a table [accuracy], otherwise
     on the grid. The program searches the pressures."""
-    mean_gap: Pressures | None = None
+    mean_gap: Values | None = None
     """Mean gaps u_g / h_std: in the continuum if the spec has a table [accuracy], otherwise on the
     grid. The program searches the pressures."""
-    displacement: Pressures | None = None
+    displacement: Values | None = None
     """Displacements [m] of the indenter from first touch, on the grid; for a free boundary or an
     elastomer whose k(0) is not zero. The program searches the pressures."""
     tolerance: Share = 1e-3
@@ -211,10 +217,10 @@ class LoadTable(SpecTable):
         loads = [name for name in LOADS if getattr(self, name) is not None]
         if len(loads) != 1:
             raise ValueError(f"give one of {', '.join(LOADS)}")
-        low, high = PRESSURE_RANGE
-        beyond = [p for p in self.listed() if not low <= p <= high]
-        if beyond and self.p_star is not None:
-            raise ValueError(f"p_star must be from {low:g} to {high:g}, got {beyond[0]:g}")
+        if self.p_star is not None:
+            low, high = PRESSURE_RANGE
+            if beyond := [p for p in self.listed() if not low <= p <= high]:
+                raise ValueError(f"p_star must be from {low:g} to {high:g}, got {beyond[0]:g}")
         if "tolerance" in self.model_fields_set and not LOADS[loads[0]].searched:
             searched = [name for name, load in LOADS.items() if load.searched]
             raise ValueError(f"tolerance belongs to {' or '.join(searched)}")
@@ -229,7 +235,7 @@ class LoadTable(SpecTable):
         """The prescribed values in the given order."""
         values = getattr(self, self.quantity)
         if isinstance(values, Ladder):
-            return values.pressures()
+            return values.values()
         return list(values) if isinstance(values, list) else [values]
 
     def values(self) -> list[float]:
