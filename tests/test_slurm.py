@@ -205,8 +205,8 @@ def test_a_study_in_the_queue_is_not_submitted_twice(gfmd, calls, tmp_path):
     [
         ((), "--shards N"),
         (("--missing",), "give --shards N"),
-        (("--shards", "5"), "the spec has 4 tasks; take 1 to 4"),
-        (("--shards", "0"), "take 1 to 4"),
+        (("--shards", "5"), "--shards 5: must be from 1 to 4, the number of tasks"),
+        (("--shards", "0"), "must be from 1 to 4"),
         (("--shards", "2", "--time", "soon"), "such as 12:00:00"),
         (("--shards", "2", "--account", "a\n#SBATCH --uid=0"), "printable"),
         (("--shards", "2", "--sbatch", "array=0-99"), "gfmd submit sets --"),

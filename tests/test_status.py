@@ -141,7 +141,7 @@ def test_status_neither_waits_for_a_collector_nor_stops_it(gfmd):
         (("none.h5",), 2, "no such study"),
         (("bad.h5",), 74, "not a readable study"),
         (("small.h5", "--set", "grid.points=32"), 2, "need a spec"),
-        (("spec.toml", "--shards", "5"), 2, "take 1 to 4"),
+        (("spec.toml", "--shards", "5"), 2, "must be from 1 to 4"),
         (("spec.toml", "--set", "grid.points=33"), 2, "use 40 or more"),
     ],
 )

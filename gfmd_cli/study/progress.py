@@ -14,7 +14,6 @@ from gfmd_cli.study.reading import open_study
 from gfmd_cli.study.store import Study
 from gfmd_cli.study.tasks import plan
 from gfmd_cli.study.unfinished_work import read_failure
-from gfmd_cli.units import count
 
 
 @dataclass(frozen=True)
@@ -85,7 +84,7 @@ def is_study(path: Path) -> bool:
 def check_shards(shards: int, tasks: int) -> None:
     """Raise InputError where some shard would have no task."""
     if not 0 < shards <= tasks:
-        raise InputError(f"--shards {shards}: of {count(tasks, 'task')}; take 1 to {tasks}")
+        raise InputError(f"--shards {shards}: must be from 1 to {tasks}, the number of tasks")
 
 
 def _progress(
