@@ -128,9 +128,9 @@ def _next_command(progress: "StudyProgress", words: str) -> str:
         return f"gfmd analyze {typed(progress.study)}"
     if progress.study.with_suffix(SUFFIX).exists():
         return f"gfmd submit {words} --missing    # when its jobs have left the queue"
-    waiting = [task for task in progress.tasks if task.status is Status.MISSING]
-    all_failed = all(task.failure for task in waiting)
-    return f"gfmd run {words}" + ("    # when the causes of the failures are removed" * all_failed)
+    have_failed = all(task.failure for task in progress.tasks if not task.status.is_solved)
+    condition = "    # when the causes of the failures are removed" if have_failed else ""
+    return f"gfmd run {words}{condition}"
 
 
 def _saved(task: int, saved: "SavedProgress") -> dict[str, Any]:
