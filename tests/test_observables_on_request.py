@@ -1,6 +1,7 @@
 """What [output] asks for beside the scalars, from the spec to the study, tables and records."""
 
 import json
+import re
 import shutil
 
 import h5py
@@ -132,7 +133,8 @@ def test_analyze_tells_the_columns_in_a_table_and_in_records(output_of, study):
     text = output_of("analyze", study)
     assert text.count("mean patch") == 2  # two elastomers, in reduced units
     assert "[Pa" not in text
-    assert "yes" in text
+    along = re.findall(r"  (yes|no) +(yes|no)$", text, re.MULTILINE)
+    assert along == 2 * [("yes", "yes"), ("no", "no"), ("no", "no")]
     caption = " ".join(text.partition("Observables:")[2].split())
     assert "1 (yes) if the gap (4-connected points) percolates along x, 0 (no) if not" in caption
     assert "The same along y; blank for a line contact." in caption

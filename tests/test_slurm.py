@@ -194,7 +194,9 @@ def test_a_study_in_the_queue_is_not_submitted_twice(gfmd, calls, tmp_path):
     gfmd("submit", "spec.toml", "--shards", 4)
     path = Path("small.sbatch").resolve()
     (tmp_path / "queue").write_text(f"9 /other.sbatch\n12_[1-3] {path}\n13 {path}\n")
+    before = len(calls())
     result = gfmd("submit", "spec.toml", "--missing")
+    assert not any(call.startswith("sbatch") for call in calls()[before:])
     assert result.exit_code == 2
     assert "job 12_[1-3] of this study is in the queue" in result.output
     assert "scancel 12`" in result.output

@@ -83,7 +83,8 @@ def ladder(read, **keys):
 
 def test_a_ladder_has_a_fixed_step_and_stays_below_its_end(read):
     pressures = ladder(read, from_=1e-3, to=3.0, per_decade=4).load.values()
-    assert pressures == pytest.approx([1e-3 * 10 ** (i / 4) for i in range(14)], rel=1e-14)
+    expected = [1e-3 * 10 ** (i / 4) for i in range(14)]
+    assert pressures == pytest.approx(expected, rel=1e-14, abs=0)
     assert pressures[-1] <= 3.0 < pressures[-1] * 10**0.25
 
 
@@ -312,11 +313,13 @@ def test_a_cutoff_that_no_grid_resolves_names_its_unit(read):
             plan(read(*changed, overrides=("accuracy.mean_gap=0.1",)))
 
 
-@pytest.mark.parametrize("content", [b"\xff\xfe\x00", b"#" * 300_000])
-def test_a_file_that_is_no_spec_is_refused(tmp_path, content):
+@pytest.mark.parametrize(
+    ("content", "words"), [(b"\xff\xfe\x00", "not UTF-8"), (b"#" * 300_000, "too long")]
+)
+def test_a_file_that_is_no_spec_is_refused(tmp_path, content, words):
     path = tmp_path / "spec.toml"
     path.write_bytes(content)
-    with pytest.raises(InputError):
+    with pytest.raises(InputError, match=words):
         read_spec(path)
 
 

@@ -26,8 +26,10 @@ from gfmd_cli.study import run as run_module
 from gfmd_cli.study.checkpoint import Checkpoint
 from gfmd_cli.study.columns import COLUMNS, LAYOUT
 from gfmd_cli.study.notes import Notes, Trial
+from gfmd_cli.study.pointer import read_pointer
 from gfmd_cli.study.reading import open_study, read_rows
 from gfmd_cli.study.run import RunOptions, run_study
+from gfmd_cli.study.tasks import plan
 from gfmd_cli.study.unfinished_work import read_record
 
 SMALL = power_spec(
@@ -567,17 +569,22 @@ def test_a_signal_saves_the_state_and_the_same_call_goes_on(run, tmp_path, jobs)
     words = ["run", "spec.toml", "-o", "broken.h5", "-j", jobs]
     parts = tmp_path / "broken.parts"
     process = gfmd(tmp_path, *words)
-    for _ in range(600):
-        if (parts / "in-use").exists():
+    for _ in range(6000):
+        if list(parts.glob("*/lock")):  # a task has begun
             break
-        time.sleep(0.1)
+        time.sleep(0.01)
     time.sleep(0.3)
     process.send_signal(signal.SIGTERM)
     assert process.wait(60) == 75
     process.stderr.close()
-    process = gfmd(tmp_path, *words)
-    assert process.wait(120) == 1  # the tolerance is out of reach
-    process.stderr.close()
+    saved = {path.parent.name: read_pointer(path)[0] for path in parts.glob("*/pointer")}
+    assert saved
+    _, events, _ = run(LONG, name="broken.h5", jobs=int(jobs))
+    for task in plan(read_spec(tmp_path / "spec.toml")[0]):
+        if task.id in saved:
+            steps = (e for e in events if (e.task, e.event) == (task.index, "step"))
+            first, slot = next(steps), saved[task.id]
+            assert (first.points, first.step) >= (slot.shape[-1], slot.state.step)
     np.testing.assert_array_equal(results(tmp_path / "broken.h5"), results(unbroken))
 
 
@@ -585,15 +592,20 @@ def test_a_killed_run_loses_no_finished_pressure(run, tmp_path):
     unbroken, _, _ = run(name="unbroken.h5")
     shutil.copy(tmp_path / "spec.toml", tmp_path / "again.toml")
     words = ["run", "again.toml", "-o", "killed.h5", "-j", "1"]
-    for _ in range(6):
-        process = gfmd(tmp_path, *words)
-        time.sleep(0.8)
-        os.killpg(process.pid, signal.SIGKILL)
-        process.wait()
-        process.stderr.close()
+    process, records = gfmd(tmp_path, *words), []
+    for _ in range(6000):
+        if records := list((tmp_path / "killed.parts").glob("*.record")):
+            break
+        time.sleep(0.01)
+    os.killpg(process.pid, signal.SIGKILL)
+    process.wait()
+    process.stderr.close()
+    seconds = {read_record(path).entry.row["seconds"] for path in records}
+    assert seconds
     process = gfmd(tmp_path, *words)
     _, errors = process.communicate(timeout=60)
     assert process.returncode == 0, errors
+    assert seconds <= {row["seconds"] for row in read_rows(tmp_path / "killed.h5")}
     np.testing.assert_array_equal(results(tmp_path / "killed.h5"), results(unbroken))
 
 

@@ -104,12 +104,13 @@ def autocorrelation(heights: MaskedField) -> Field:
     """Autocorrelation over its value at zero shift, mean over the known pairs of points.
 
     A map is not continued periodically: pairs exist where the map and its shifted copy overlap.
-    NaN where fewer than `MIN_OVERLAP` of the points do.
+    NaN where fewer than `MIN_OVERLAP` of the points do, and if all heights are equal.
 
     Returns an array of twice the shape, indexed by the shift as the output of an FFT.
     """
     known = ~np.ma.getmaskarray(heights)
-    z = np.where(known, np.ma.filled(heights, 0.0) - heights.mean(), 0.0)
+    mean = heights.mean() if heights.min() < heights.max() else heights.min()  # without rounding
+    z = np.where(known, np.ma.filled(heights, 0.0) - mean, 0.0)
     shape, axes = [2 * points for points in z.shape], tuple(range(z.ndim))
 
     def pairs(values: Field) -> Field:

@@ -71,7 +71,7 @@ def autocorrelations(
 
 
 def correlation(grid: Grid, field: Field) -> Field:
-    """C(r) / C(0) at every displacement r of the grid, shape `grid.shape`.
+    """C(r) / C(0) at every displacement r of the grid, shape `grid.shape`; NaN if f is constant.
 
     This is the transform of |f(q)|^2 without q = 0, by the Wiener-Khinchin theorem.
     """
@@ -80,5 +80,5 @@ def correlation(grid: Grid, field: Field) -> Field:
         modes[rows] *= modes[rows].conj()
     modes.flat[0] = 0.0
     products = grid.field_of_work()
-    variance = float(products.flat[0])
-    return np.divide(products, variance if variance > 0 else np.nan, out=products)
+    is_constant = np.ptp(field) == 0  # but for rounding its variance is zero
+    return np.divide(products, np.nan if is_constant else products.flat[0], out=products)

@@ -347,6 +347,7 @@ def test_without_scripts_all_figures_and_maps_are_there(browser, page):
         browser.visit(page)
     finally:
         browser.driver.execute_cdp_cmd(disable, {"value": False})
+    assert browser.run("return document.querySelectorAll('.drawing svg').length") > 10
     hidden = "[...document.querySelectorAll('.drawing svg')].filter(one => one.clientWidth < 200)"
     assert browser.run(f"return {hidden}.length") == 0
     assert browser.run("return document.querySelectorAll('button, input, .plot').length") == 0
@@ -355,6 +356,7 @@ def test_without_scripts_all_figures_and_maps_are_there(browser, page):
 def test_paper_shows_the_static_figures(browser, page):
     browser.visit(page)
     browser.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "print"})
+    assert browser.run("return document.querySelectorAll('.drawing').length") > 10
     hidden = "[...document.querySelectorAll('.drawing')].filter(one => !one.offsetParent)"
     assert browser.run(f"return {hidden}.length") == 0
     assert browser.run(
