@@ -421,6 +421,7 @@ def test_the_bounds_hold_the_distance_to_the_solution(elastomer, p_star, toleran
         error = bounds.estimated_error(name, observables, approximate.residual)
         assert abs(getattr(observables, name) - getattr(exact, name)) <= error + 1e-13
     assert abs(observables.a_r - exact.a_r) <= bounds.a_r + 3 / contact.grid.size
+    assert bounds.a_r < {1e-2: 0.3, 1e-4: 0.01, 1e-6: 1e-3}[tolerance]
 
 
 def test_a_bad_solution_gets_wide_bounds():
@@ -697,5 +698,7 @@ def test_bars_hold_for_textures_and_ribbons(heights, n):
         for name in ("a_r", "sigma_p", "u_g"):
             value, bar = found[f"{name}_continuum"], found[f"{name}_continuum_error"]
             own = exact[f"{name}_continuum_error"]
-            assert not abs(value - exact[f"{name}_continuum"]) > np.hypot(bar, own)
+            assert found[f"{name}_verdict"] == ("unknown" if points == 64 else "regular")
+            if points != 64:
+                assert abs(value - exact[f"{name}_continuum"]) <= np.hypot(bar, own)
     assert exact["u_g_verdict"] == "regular"

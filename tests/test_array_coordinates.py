@@ -41,7 +41,7 @@ def array(tmp_path):
 
 def test_units_and_positions_give_a_scan_in_metres(array):
     read = read_topography(array())
-    assert read.heights == pytest.approx(1e-9 * HEIGHTS)
+    assert read.heights == pytest.approx(1e-9 * HEIGHTS, rel=1e-9, abs=0)
     assert read.spacing == pytest.approx((0.25e-6, 0.5e-6))
     assert (read.metres, read.metric_heights, read.periodic) == (True, True, False)
     surface = FileSurface(path=array())
@@ -54,7 +54,7 @@ def test_units_and_positions_give_a_scan_in_metres(array):
 def test_an_array_indexed_by_x_and_y_is_transposed(array, names):
     axes = dict(zip(names, (X, Y), strict=True))
     read = read_topography(array(HEIGHTS.T, axes, {"height": "nm", **dict.fromkeys(names, "um")}))
-    assert read.heights == pytest.approx(1e-9 * HEIGHTS)
+    assert read.heights == pytest.approx(1e-9 * HEIGHTS, rel=1e-9, abs=0)
     assert read.spacing == pytest.approx((0.25e-6, 0.5e-6))
 
 
@@ -69,7 +69,7 @@ def test_axes_of_other_names_keep_their_order(array):
 def test_a_descending_axis_is_turned(array, axis):
     axes = {"y": Y[::-1] if axis == 0 else Y, "x": X[::-1] if axis == 1 else X}
     read = read_topography(array(np.flip(HEIGHTS, axis), axes))
-    assert read.heights == pytest.approx(1e-9 * HEIGHTS)
+    assert read.heights == pytest.approx(1e-9 * HEIGHTS, rel=1e-9, abs=0)
 
 
 def test_uneven_positions_are_refused_by_the_name_of_the_axis(array):
@@ -93,7 +93,7 @@ def test_a_unit_of_one_axis_alone_is_refused(array):
 @pytest.mark.parametrize("unit", ["nanometers", "nanometre", "nm"])
 def test_units_in_words(array, unit):
     read = read_topography(array(units=UNITS | {"height": unit}))
-    assert read.heights == pytest.approx(1e-9 * HEIGHTS)
+    assert read.heights == pytest.approx(1e-9 * HEIGHTS, rel=1e-9, abs=0)
 
 
 @pytest.mark.parametrize("name", ["x", "height"])
@@ -133,7 +133,7 @@ def test_a_unit_without_positions_gives_a_warning(array):
 
 def test_a_leading_axis_of_one_point_is_dropped(array):
     read = read_topography(array(HEIGHTS[None], {"time": [7.0], "y": Y, "x": X}))
-    assert read.heights == pytest.approx(1e-9 * HEIGHTS)
+    assert read.heights == pytest.approx(1e-9 * HEIGHTS, rel=1e-9, abs=0)
     assert read.spacing == pytest.approx((0.25e-6, 0.5e-6))
 
 

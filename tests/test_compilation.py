@@ -41,6 +41,7 @@ def test_kernels_from_the_cache_give_the_bits_of_those_just_compiled(tmp_path):
     ]
     assert len(results[0].split()) == 2
     assert results[0] == results[1]
+    assert list(tmp_path.rglob("*.nbc"))
 
 
 KERNEL = """

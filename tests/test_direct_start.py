@@ -222,6 +222,7 @@ def test_from_the_grid_on_that_has_too_many_points_the_iteration_goes_on(monkeyp
         monkeypatch.setattr(module, "MAX_COST", cost)
         solution = solve_contact(contact, ProjectedCG(tolerance=1e-6))
         assert solution.u == pytest.approx(whole.u, abs=1e-6)
+        assert solution.is_direct == (points > 1.3 * held)
 
 
 def test_a_large_contact_is_left_to_the_iteration():

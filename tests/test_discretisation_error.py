@@ -402,8 +402,13 @@ def test_bars_of_line_contacts_hold(shape, n):
             estimated, exact = values[name], getattr(measured[2048, p], name)
             if estimated.verdict == "regular" and measured[2048, p].a_r < 1:
                 of_shape.append(abs(estimated.continuum - exact) <= estimated.continuum_error)
+    assert len(held["u_g"]) >= 3
     assert all(held["u_g"])
-    assert np.mean(held["sigma_p"] or [1.0]) > 0.8
+    if shape.tip_exponent == 1 and n > 1:
+        assert held["sigma_p"] == []  # no bar of the stress
+    else:
+        assert len(held["sigma_p"]) >= 3
+        assert np.mean(held["sigma_p"]) > 0.8
 
 
 def test_the_area_of_a_kinked_profile_is_extrapolated_from_the_change_alone():

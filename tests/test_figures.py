@@ -31,7 +31,9 @@ points = 256
 p_star = [0.01, 0.1]
 """
 LONG = "measurement_2024_11_sample_steel_ground_position_"
-OVER_PRESSURE = {panel.name for panel in PANELS}
+OVER_PRESSURE = {
+    "contact_area", "contact_area_ratio", "stress_deviation", "mean_gap_log", "mean_gap_tail",
+}  # fmt: skip
 DISTRIBUTIONS = {"stress_distribution", "stress_distribution_pressures"}
 
 
@@ -252,7 +254,9 @@ def test_lines_of_the_theory_go_on_where_they_underflow(study):
     lines = [layer for layer in plot.layers if layer.kind == "line"]
     assert len(lines) == 3  # of two elastomers, and the exact one of n = 0
     for line in lines:
-        assert np.all(line.y[line.x > 50] == 0.0)
+        beyond = line.y[line.x > 50]
+        assert beyond.size > 0
+        assert np.all(beyond == 0.0)
 
 
 def test_a_study_in_pascals_has_them_on_a_second_axis(study):

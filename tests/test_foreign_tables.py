@@ -60,7 +60,7 @@ def test_rounded_positions_are_even(saved, digits, separator):
     """The first distance, 0.33, is that of no other pair of many points."""
     text = points(np.arange(300) / 3, 7 + np.arange(12) / 3, digits, separator)
     read = read_topography(saved("x [um] y [um] z [nm]\n" + text))
-    assert read.heights == pytest.approx(1e-9 * HEIGHTS)
+    assert read.heights == pytest.approx(1e-9 * HEIGHTS, rel=1e-9, abs=0)
     assert read.spacing == pytest.approx((1e-6 / 3, 1e-6 / 3), rel=2e-3)
 
 
@@ -124,14 +124,14 @@ def test_the_header_states_the_order_of_the_columns(saved, order, header, separa
     read = read_topography(
         saved(f"{header}\n" + "".join(separator.join(map(str, row)) + "\n" for row in rows))
     )
-    assert read.heights == pytest.approx(1e-9 * HEIGHTS)
+    assert read.heights == pytest.approx(1e-9 * HEIGHTS, rel=1e-9, abs=0)
     assert read.spacing == pytest.approx((0.25e-3, 0.5e-6))
 
 
 def test_a_profile_may_begin_with_its_heights(saved):
     rows = "".join(f"{HEIGHTS[0, i]} {0.5 * i}\n" for i in range(300))
     read = read_topography(saved("z [nm] x [um]\n" + rows))
-    assert read.heights == pytest.approx(1e-9 * HEIGHTS[0])
+    assert read.heights == pytest.approx(1e-9 * HEIGHTS[0], rel=1e-9, abs=0)
     assert read.spacing == pytest.approx((0.5e-6,))
 
 
@@ -218,7 +218,7 @@ def test_a_second_matrix_without_a_line_between_is_refused(saved):
     with pytest.raises(InputError, match=r"map\.txt:16: words between two rows of the table"):
         read_topography(saved(2 * one))
     two = f"# Channel: a\n{one}# Channel: b\n{one}"
-    assert read_topography(saved(two)).heights == pytest.approx(1e-9 * HEIGHTS)
+    assert read_topography(saved(two)).heights == pytest.approx(1e-9 * HEIGHTS, rel=1e-9, abs=0)
 
 
 def test_lines_of_comments_below_the_header_of_positions_are_left_out(saved):
@@ -279,7 +279,7 @@ def test_quoted_numbers(saved, separator, decimal, encoding):
 def test_quoted_positions(saved):
     text = points(np.arange(300), np.arange(12), separator='","').replace("\n", '"\n"')
     path = saved('"x [um]","y [um]","z [nm]"\n"' + text.removesuffix('"'), "utf-8-sig")
-    assert read_topography(path).heights == pytest.approx(1e-9 * HEIGHTS)
+    assert read_topography(path).heights == pytest.approx(1e-9 * HEIGHTS, rel=1e-9, abs=0)
 
 
 def test_quoted_decimal_commas_between_commas_are_refused(saved):
@@ -300,7 +300,7 @@ def test_an_empty_cell_is_refused_as_such(saved, separator, quote):
 def test_a_numbered_profile_has_the_units_of_its_header(saved):
     rows = "".join(f'"{i + 1}","{0.277 * i:.3f}","{HEIGHTS[0, i]:.6f}"\n' for i in range(300))
     read = read_topography(saved('"No.","Horz. [um]","Height [nm]"\n' + rows))
-    assert read.heights == pytest.approx(1e-9 * HEIGHTS[0])
+    assert read.heights == pytest.approx(1e-9 * HEIGHTS[0], rel=1e-9, abs=0)
     assert read.spacing == pytest.approx((0.277e-6,))
 
 

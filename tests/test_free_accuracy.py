@@ -80,6 +80,8 @@ def test_the_bounds_hold_the_distance_to_the_solution(elastomer, void, pressure,
         return -observables.energy - (observables.work - 2 * observables.energy)
 
     assert energy(inexact) - energy(exact) <= bounds.duality_gap + rounding
+    assert bounds.sigma_p < {1e-2: 1.0, 1e-4: 0.1}[tolerance] * np.std(approximate.sigma)
+    assert bounds.duality_gap < {1e-2: 2e-2, 1e-4: 2e-4}[tolerance]
 
 
 @pytest.mark.parametrize("n", [0.5, 1, 1.5])

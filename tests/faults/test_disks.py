@@ -50,12 +50,17 @@ def test_a_full_disk_is_one_message_and_the_run_goes_on_when_there_is_space(
 def test_an_output_that_cannot_be_written_is_one_message_and_leaves_nothing(folder, gfmd, name):
     assert gfmd(folder, *RUN)[0] == 0
     before = sorted(folder.iterdir())
-    for kib in (4, 16, 40, 100):
+    assert gfmd(folder, *OUTPUTS[name])[0] == 0
+    (written,) = set(folder.iterdir()) - set(before)
+    whole = written.stat().st_size
+    written.unlink()
+    for kib in (1, 4, 16, 40, 100):
 
         def limit(size=1024 * kib):
             resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
 
         status, output = gfmd(folder, *OUTPUTS[name], before=limit)
+        assert (status != 0) == (1024 * kib < whole)
         if status != 0:
             assert status == 73, (kib, output)
             assert "cannot be written: File too large" in output

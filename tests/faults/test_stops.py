@@ -7,12 +7,14 @@ import shutil
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections import Counter
 
 import pytest
 
 from gfmd_cli.files.locks import locked
+from gfmd_cli.study.signals import signal_handlers
 
 from .conftest import SIGNALS
 from .equal import assert_same_bits
@@ -108,6 +110,16 @@ def test_a_second_interrupt_leaves_at_once(folder, start):
     time.sleep(0.05)
     child.signal(signal.SIGINT)
     assert child.wait() in (130, 75)
+
+
+def test_the_second_interrupt_ends_the_process(monkeypatch):
+    ended, stop = [], threading.Event()
+    monkeypatch.setattr(os, "_exit", ended.append)
+    with signal_handlers(stop, may_exit=True):
+        signal.raise_signal(signal.SIGINT)
+        assert (stop.is_set(), ended) == (True, [])
+        signal.raise_signal(signal.SIGINT)
+    assert ended == [130]
 
 
 @pytest.mark.parametrize("program", [LOSING, IGNORING])
