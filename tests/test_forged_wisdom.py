@@ -12,12 +12,13 @@ from gfmd_cli.grid import plans
 from gfmd_cli.grid.fft_grid import Grid
 
 COUNT = 10 * int(os.environ.get("GFMD_FORGERIES", "10"))  # `make test-kills` takes 200
-POINTS = 60
+POINTS = 30
 
 
 @pytest.fixture
-def wisdom(tmp_path):
-    """What FFTW measured for a grid; a folder to keep it in."""
+def wisdom(tmp_path, monkeypatch):
+    """What FFTW measured for a grid; a folder to keep it in. The cache is empty before."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     plans.plan_with(tmp_path)
     Grid(POINTS).transform()
     if plans.plans() == "estimated":  # GFMD_PLANS
@@ -27,15 +28,16 @@ def wisdom(tmp_path):
 
 
 def keep(folder, wisdom, text=None):
-    """Keep wisdom in a folder, with a valid checksum; `text` takes the place of the first one."""
-    (key, texts), *others = wisdom.items()
-    plans._write(folder, {key: [text or texts[0], texts[1]], **dict(others)})
+    """Keep wisdom in a folder, with a valid checksum; `text` takes the place of its text."""
+    ((key, (double, single)),) = wisdom.items()
+    plans._write(folder, {key: [text or double, single]})
     plans._forget()
 
 
-def first(wisdom):
-    """The first text, in double precision."""
-    return next(iter(wisdom.values()))[0]
+def text_of(wisdom):
+    """The text in double precision of the only group of transforms."""
+    ((double, _),) = wisdom.values()
+    return double
 
 
 def test_wisdom_as_fftw_writes_it_is_read(wisdom, tmp_path):
@@ -49,7 +51,7 @@ def test_flags_of_too_many_bits_which_abort_fftw_are_not_read(wisdom, tmp_path, 
     numbers = ["#x11bdd", "#x11bdd", "#x0"]
     numbers[place] = ["#x11bdd0", "#x11bdd0", "#x200"][place]
     line = "  (fftw_rdft2_nop_register 0 {} #x1 #x2 #x3 #x4)\n)\n".format(" ".join(numbers))
-    keep(tmp_path, wisdom, first(wisdom)[:-2] + line)
+    keep(tmp_path, wisdom, text_of(wisdom)[:-2] + line)
     assert plans.read_wisdom(tmp_path) is None
 
 
@@ -85,7 +87,7 @@ def transformed():
 def test_forged_plans_change_no_number(wisdom, tmp_path):
     rng, read = random.Random(0), 0
     for _ in range(COUNT):
-        keep(tmp_path, wisdom, forged(first(wisdom), rng))
+        keep(tmp_path, wisdom, forged(text_of(wisdom), rng))
         read += plans.read_wisdom(tmp_path) is not None
         values, exact = transformed()
         assert np.abs(values - exact).max() < 1e-12 * np.abs(exact).max()
