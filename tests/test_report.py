@@ -748,7 +748,7 @@ def test_no_ratio_of_gaps_is_told_where_all_are_tiny(invoke, tmp_path):
 def test_tasks_that_failed_are_not_said_to_be_waiting(invoke, tmp_path):
     path = solved(invoke, tmp_path, ONE.replace("p_star = 0.3", "contact_area = [0.3, 1e-9]"))
     page = " ".join(report(path).split())
-    assert "1 of 2 is not solved yet or failed." in page
+    assert "1 of 2 is not solved yet or has failed." in page
     assert "<code>gfmd status</code> prints the errors of those that failed" in page
 
 

@@ -181,8 +181,8 @@ def warnings(data: ReportData) -> list[str]:
         contacts = count(total, "contact")
         parts += [f"{number} of {contacts}: {what}" for what, number in missed.items()]
     if missing:
-        verb = "is" if missing == 1 else "are"
-        parts.append(f"{missing} of {total} {verb} not solved yet or failed")
+        be, have = ("is", "has") if missing == 1 else ("are", "have")
+        parts.append(f"{missing} of {total} {be} not solved yet or {have} failed")
     unsolved = ["; ".join(parts) + "."] if parts else []
     return [*unsolved, *warnings_in(data.solved), *_unresolved(data)]
 
