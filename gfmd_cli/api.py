@@ -47,7 +47,8 @@ NUMBERS = (
     "length", "length_y", "h_std", "delta_sigma", "a_r", "sigma_p", "u_g", "residual", "status",
 )  # fmt: skip
 """Attributes of a result that are columns of a study under the same name."""
-OF_CONTINUUM = {"a_r": "contact area", "sigma_p": "stress deviation", "u_g": "mean gap"}
+WITH_CONTINUUM = {"a_r": "contact area", "sigma_p": "stress deviation", "u_g": "mean gap"}
+"""Names in the summary of the quantities that can have a continuum value."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,13 +124,12 @@ class Result:
             "largest pressure": f"{self.pressure.max():.4g} Pa",
             "scales": f"h_std = {self.h_std:.4g} m, Delta_sigma = {self.delta_sigma:.4g} Pa",
         }
-        for symbol, name in OF_CONTINUUM.items():
-            if verdict := self.columns.get(f"{symbol}_verdict"):
+        for symbol, name in WITH_CONTINUUM.items():
+            if in_continuum(self.columns, symbol):
                 value, error = (self.columns[f"{symbol}_continuum{end}"] for end in ("", "_error"))
-                of_it = f"{symbol} = {plus_minus(value, error)}"
-                if not in_continuum(self.columns, symbol):
-                    of_it = Verdict(verdict).explanation
-                numbers[f"{name} in the continuum"] = of_it
+                numbers[f"{name} in the continuum"] = f"{symbol} = {plus_minus(value, error)}"
+            elif verdict := self.columns.get(f"{symbol}_verdict"):
+                numbers[f"{name} in the continuum"] = Verdict(verdict).explanation
         return numbers | ({"warnings": "; ".join(self.warnings)} if self.warnings else {})
 
     def __str__(self) -> str:

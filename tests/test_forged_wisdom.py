@@ -28,7 +28,7 @@ def wisdom(tmp_path, monkeypatch):
 
 
 def keep(folder, wisdom, text=None):
-    """Keep wisdom in a folder, with a valid checksum; `text` takes the place of its text."""
+    """Keep wisdom in a folder, with a valid checksum; `text` replaces that in double precision."""
     ((key, (double, single)),) = wisdom.items()
     plans._write(folder, {key: [text or double, single]})
     plans._forget()

@@ -111,7 +111,7 @@ def solvers_to_compare(spec: Spec, task: Task, contact: Contact) -> list[Solver]
 
 
 def _suits(solver: Solver, task: Task) -> bool:
-    """Whether a solver suits the elastomer of a task; one for some n suits no other k(q)."""
+    """Whether a solver suits an elastomer; one with a largest exponent suits power laws only."""
     n = task.elastomer.exponent
     return (np.inf if n is None else n) <= solver.max_exponent
 

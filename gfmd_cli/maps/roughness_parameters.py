@@ -109,7 +109,8 @@ def autocorrelation(heights: MaskedField) -> Field:
     Returns an array of twice the shape, indexed by the shift as the output of an FFT.
     """
     known = ~np.ma.getmaskarray(heights)
-    mean = heights.mean() if heights.min() < heights.max() else heights.min()  # without rounding
+    lowest = heights.min()
+    mean = heights.mean() if lowest < heights.max() else lowest  # the mean of equal ones is rounded
     z = np.where(known, np.ma.filled(heights, 0.0) - mean, 0.0)
     shape, axes = [2 * points for points in z.shape], tuple(range(z.ndim))
 

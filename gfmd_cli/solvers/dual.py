@@ -131,7 +131,7 @@ class Dual(Solver):
             state.step += 1
 
     def _advance(self, contact: FreeContact, state: DualState, chosen: Mask) -> bool:
-        """Move along the direction such that the energy falls; false where rounding hides how."""
+        """Move such that the energy falls; false if no length does that, because of rounding."""
         free, grid, stress, change = contact.free, contact.grid, state.sigma, state.change
         if state.length == 0:
             free.displacement(state.direction, out=change)

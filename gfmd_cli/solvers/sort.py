@@ -20,8 +20,7 @@ WAVENUMBERS = np.logspace(-3, 12, 46)
 class Sort(Solver):
     """Exact solution for constant k = k_0 (n = 0): sigma = k_0 max(h - c, 0), with <sigma> = p.
 
-    u = max(h, c): the points do not interact. Paper Sect. 4.2. Like that of `direct_start`, the
-    stress is not computed as K u + p, whose rounding exceeds p where the contact is small.
+    u = max(h, c): the points do not interact. Paper Sect. 4.2.
     """
 
     kind: Literal["sort"] = "sort"
@@ -46,10 +45,10 @@ class Sort(Solver):
         known = contact.height if contact.may_touch is None else contact.height[contact.may_touch]
         level = non_contact_height(contact.grid, known, displaced)
         np.maximum(contact.obstacle, level, out=u)
-        sigma = u - level
+        sigma = u - level  # not K u + p, whose rounding exceeds p where the contact is small
         if not contact.grid.any(sigma > 0):  # p is far below the rounding of the heights
             sigma[...] = contact.obstacle >= level
-        sigma *= contact.pressure * contact.grid.size / contact.grid.total(sigma.sum())
+        sigma *= contact.pressure / contact.grid.mean(sigma)
         return State(u=u, sigma=sigma)
 
     def iterate(self, contact: Contact, state: State) -> Iterator[State]:

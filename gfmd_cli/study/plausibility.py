@@ -186,7 +186,7 @@ def finest_share(scene: Scene) -> float:
 
 
 def _unit_of_grid(task: Task, scene: Scene) -> Iterator[str]:
-    """A warning if p* of a single indenter has another unit on another grid, if there is one."""
+    """A warning if the unit of p* of a single indenter depends on the grid; also on one grid."""
     if task.has_fixed_unit or task.surface.rough:
         return
     if (share := finest_share(scene)) > MAX_FINEST_SHARE:

@@ -87,7 +87,7 @@ def _cgroup_limits(membership: Path, root: Path) -> Iterator[float]:
         if not controllers:
             top, limit, used, prefix = root, "memory.max", "memory.current", ""
         elif "memory" in controllers.split(","):
-            top, prefix = root / "memory", "total_"  # those of the groups within included
+            top, prefix = root / "memory", "total_"  # with the groups inside, as in `used`
             limit, used = "memory.limit_in_bytes", "memory.usage_in_bytes"
         else:
             continue

@@ -89,7 +89,8 @@ class RemainingTime:
             seconds * self._speed_ratio(elastomer)
             for elastomer, seconds in self.waiting_seconds.items()
         )
-        return max([0.0, *all_left, (sum(all_left) + waiting) / self.jobs])  # 0.0: rounding
+        shared = (sum(all_left) + waiting) / self.jobs  # at the end, by rounding, below zero
+        return max([0.0, *all_left, shared])
 
     def _speed_ratio(self, elastomer: Any) -> float:
         """Measured over forecast seconds of the ended tasks of an elastomer, or else of all."""
