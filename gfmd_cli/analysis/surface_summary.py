@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from gfmd_cli.analysis.table import Group, Table, TableColumn, plain, records_of
+from gfmd_cli.analysis.table import Group, Table, TableColumn, plain, plus_minus, records_of
 from gfmd_cli.maps.height_map import extent
 from gfmd_cli.maps.map_warnings import unresolved
 from gfmd_cli.maps.roughness_parameters import MAP_NAMES, PROFILE_NAMES, roughness_parameters
@@ -194,9 +194,9 @@ def _fit_lines(nearest: SelfAffineFit, metres: str) -> list[str]:
     wavelength, error = nearest.rolloff_wavelength, nearest.rolloff_error
     rolloff = "no roll-off within the cell"
     if wavelength is not None:
-        rolloff = f"lambda_r = {wavelength:.3g} +- {error:.2g}{metres}"
+        rolloff = f"lambda_r = {plus_minus(wavelength, error)}{metres}"
     lines = [
-        f"fitted spectrum: H = {nearest.hurst:.3f} +- {nearest.hurst_error:.3f}, {rolloff}, "
+        f"fitted spectrum: H = {plus_minus(nearest.hurst, nearest.hurst_error)}, {rolloff}, "
         f"lambda_s = {nearest.cutoff_wavelength:.3g}{metres}, rms height "
         f"{nearest.rms_height:.4g}{metres} (scatter {nearest.scatter:.3g})"
     ]
