@@ -6,6 +6,7 @@
 
 Default surface, one thread. Both ways are timed side by side, `--repeats` times; the minimum
 counts. The numbers of transforms are means over the seeds, and the ratio of times is their median.
+Tables of docs/solver_measurements.md and docs/performance.md, with the options named there.
 """
 
 import argparse
