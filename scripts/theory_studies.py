@@ -202,7 +202,8 @@ def main() -> None:
             with Reporter(True) as report:
                 store = arguments.folder / f"{name}.h5"
                 outcome = run_study(spec, source, store, report, RunOptions(jobs=1))
-            print(f"{path.stem}: {dict(outcome)}", flush=True)
+            counts = ", ".join(f"{count} {status}" for status, count in outcome.items())
+            print(f"{path.stem}: {counts}", flush=True)
 
 
 if __name__ == "__main__":
