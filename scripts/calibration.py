@@ -552,6 +552,11 @@ def collect(chosen: list[Case], cache: Path | None = None) -> list[dict]:
     if cache:
         cache.parent.mkdir(parents=True, exist_ok=True)
     records = json.loads(cache.read_text()) if cache and cache.exists() else []
+    pairs = zip(records, chosen, strict=False)
+    if any(
+        (record["name"], record["p_star"]) != (case.name, case.p_star) for record, case in pairs
+    ):
+        raise SystemExit(f"{cache} has the cases of other options")
     begun = time.perf_counter()
     for case in chosen[len(records) :]:
         records.append(measure(case))
