@@ -30,8 +30,9 @@ smoke: $(VENV)/.core ## the smallest complete study
 
 PYTEST := pytest -n 2 --dist loadfile
 # Files whose tests solve contacts on grids: threads change only their last bits.
-SOLVING := accuracy bench grid local_start multigrid properties reference_solvers search solvers study \
-	true_contact
+SOLVING := accuracy bench contact_stiffness direct_start free_accuracy free_boundary \
+	free_contact_stiffness grid local_start multigrid observables_on_request properties \
+	rectangular_cells reference_solvers restarts search solvers study true_contact void
 
 test: $(VENV)/.test ## the whole suite, with the newest versions that pip found for a new .venv
 	$(BIN)/$(PYTEST)

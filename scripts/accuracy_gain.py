@@ -1,6 +1,6 @@
 """Seconds of grids chosen by accuracy against one uniform grid that is as good everywhere.
 
-    python scripts/accuracy_gain.py --max-points 4096
+    python scripts/accuracy_gain.py --max-points 3200      # the table of docs/performance.md
 
 The default study, mean gap to 1 % and contact area to 5 %: each elastomer and pressure on the
 coarsest grid that meets both, against all of them on the finest grid that one of them needed.

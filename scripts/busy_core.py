@@ -3,7 +3,8 @@
     python scripts/busy_core.py [--points 1024 2048 4096] [--precision double]
 
 "FFTW" is its own way to share a transform among threads. The other process computes without end;
-on a machine of two cores it takes half of them. Minima, and medians beside the other process.
+on a machine of two cores it takes half of them. Minima, and medians beside the other process: a
+table of docs/performance.md.
 """
 
 import argparse

@@ -1,9 +1,11 @@
-"""How honest the bars of `physics.discretisation_error` are: contacts on nested grids.
+"""How often the error bars of `physics.discretisation_error` hold: contacts on nested grids.
+
+    python scripts/calibration.py --seed 47 --cache results/calibration_47.json
 
 Each case is one continuous contact at one pressure, solved on grids N0, 2 N0, 4 N0, ... The finest
 of them give the value of the continuum, one to three of the coarse ones an estimate of it; the
 table counts how often the estimate's bar holds. The constants of the estimates were fitted to the
-cases of the half "fit" only.
+cases of the half "fit" only. docs/calibration.md names the sets of its tables by their options.
 """
 
 import argparse
@@ -185,7 +187,7 @@ def layered_cases(seed: int) -> list[Case]:
             hurst=float(draw.choice([0.1, 0.3, 0.5, 0.8, 1.0])),
             rolloff=float(draw.choice([0.25, 0.5, 1.0])),
             cutoff=1 / modes,
-            spectrum="rolloff" if draw.choice(["rolloff", "cutoff"]) == "rolloff" else "cutoff",
+            spectrum=str(draw.choice(["rolloff", "cutoff"])),
             seed=int(draw.integers(1, 10**6)),
         )
         base = 2 * round(modes * float(draw.choice([1.0, 1.25, 1.5])))
@@ -253,7 +255,7 @@ def cases(folder: Path, seed: int = 20) -> list[Case]:
                     hurst=float(draw.choice([0.1, 0.3, 0.5, 0.8, 1.0])),
                     rolloff=float(draw.choice([0.25, 0.5, 1.0])),
                     cutoff=1 / modes,
-                    spectrum="rolloff" if spectrum == "rolloff" else "cutoff",
+                    spectrum=spectrum,
                     seed=int(draw.integers(1, 10**6)),
                 )
                 base = 2 * round(modes * float(draw.choice([1.0, 1.25, 1.5])))
@@ -527,13 +529,13 @@ def figure(scored: list[Score], path: Path) -> None:
     with styled():
         plot = ColumnFigure("true error", "error bar")
         span = (1e-6, 1.0)
-        looks = {
+        styles = {
             "a_r": ("o", "tab:blue"),
             "sigma_p": ("s", "tab:orange"),
             "u_g": ("^", "tab:green"),
         }
         labels = {"a_r": "$a_r$", "sigma_p": "$\\sigma_p/\\Delta\\sigma$", "u_g": "$u_g/h_{std}$"}
-        for quantity, (marker, colour) in looks.items():
+        for quantity, (marker, colour) in styles.items():
             chosen = [s for s in scored if not s.fit and s.quantity == quantity]
             x, y = ([getattr(s, name) for s in chosen] for name in ("error", "bar"))
             style = {"marker": marker, "ls": "none", "mfc": "none", "color": colour}
@@ -547,7 +549,14 @@ def figure(scored: list[Score], path: Path) -> None:
 
 def collect(chosen: list[Case], cache: Path | None = None) -> list[dict]:
     """Measure the cases that the cache does not hold yet, and keep them there."""
+    if cache:
+        cache.parent.mkdir(parents=True, exist_ok=True)
     records = json.loads(cache.read_text()) if cache and cache.exists() else []
+    pairs = zip(records, chosen, strict=False)
+    if any(
+        (record["name"], record["p_star"]) != (case.name, case.p_star) for record, case in pairs
+    ):
+        raise SystemExit(f"{cache} has the cases of other options")
     begun = time.perf_counter()
     for case in chosen[len(records) :]:
         records.append(measure(case))
@@ -575,28 +584,28 @@ def main() -> None:
     parser.add_argument("--layers", action="store_true", help="slabs and layers alone instead")
     parser.add_argument("--beyond", action="store_true", help="the excess of a_r beyond its limits")
     parser.add_argument("--scans", type=Path, help="with --maps: folder of maps of 64 x 64 points")
-    chosen = parser.parse_args()
-    if chosen.beyond:
+    options = parser.parse_args()
+    if options.beyond:
         discretisation_error.MAX_EXCESS_ANISOTROPY = np.inf
         discretisation_error.MAX_KINKED_EXPONENT = np.inf
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        if chosen.free:
-            wanted = free_cases(folder, chosen.seed)
-        elif chosen.shapes:
-            wanted = shape_cases(folder, chosen.seed)
-        elif chosen.layers:
-            wanted = layered_cases(chosen.seed)
-        elif chosen.maps:
-            wanted = map_cases(folder, chosen.seed, chosen.scans)
+        if options.free:
+            wanted = free_cases(folder, options.seed)
+        elif options.shapes:
+            wanted = shape_cases(folder, options.seed)
+        elif options.layers:
+            wanted = layered_cases(options.seed)
+        elif options.maps:
+            wanted = map_cases(folder, options.seed, options.scans)
         else:
-            wanted = cases(folder, chosen.seed)
-        wanted = [replace(case, p_star=chosen.shift * case.p_star) for case in wanted]
-        records = collect(quick(wanted) if chosen.quick else wanted, chosen.cache)
+            wanted = cases(folder, options.seed)
+        wanted = [replace(case, p_star=options.shift * case.p_star) for case in wanted]
+        records = collect(quick(wanted) if options.quick else wanted, options.cache)
     scored = list(scores(records))
     table(scored)
-    if chosen.figure:
-        figure(scored, chosen.figure)
+    if options.figure:
+        figure(scored, options.figure)
 
 
 if __name__ == "__main__":

@@ -6,6 +6,7 @@ A half-space under random maps, square and oblong, and under the levelled maps o
 All codes have the same kernel (stress constant on each pixel, Love 1929), so that they have to
 agree to their tolerances: FreeFFTElasticHalfSpace of ContactMechanics and dcfft of tamaas, both by
 the method of Polonsky and Keer. The peers are installed by pip into an environment of their own.
+The results are in docs/verification.md.
 """
 
 import argparse

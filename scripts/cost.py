@@ -18,6 +18,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from markdown_tables import print_head, print_row
 from matplotlib.ticker import NullLocator
 from timing import least
 
@@ -35,6 +36,7 @@ from gfmd_cli.solvers.nested_grids import solve_contact
 SURFACE = SelfAffine(cutoff=0.02)
 EXPONENTS = (0.5, 1.0, 2.0, 3.0)
 PRESSURES = (1e-3, 1e-2, 0.1)
+Curves = dict[str, tuple[np.ndarray, np.ndarray]]
 COSTS = "processor time [pairs of transforms]"
 
 
@@ -71,13 +73,12 @@ def table(points: int, repeats: int) -> None:
     pair = pair_of(Grid(points))
     print(f"{points}^2: a pair of transforms takes {1e3 * pair:.1f} ms; the preparation of the")
     print(f"surface takes {preparation(points, pair, repeats):.1f} pairs\n")
-    print("| n |", *(f"$p^\\ast$ = {p:g} |" for p in PRESSURES))
-    print("| --- |", *("--- |" for _ in PRESSURES))
+    print_head("n", *(f"$p^\\ast$ = {p:g}" for p in PRESSURES))
     for n in EXPONENTS:
         scene = build_scene(SURFACE, Power(n=n), points)
         costs = [cost(scene, p, pair, repeats) for p in PRESSURES]
-        shown = [f"{c.counted:.1f} → {c.time:.0f} ({c.time / c.counted:.1f}) |" for c in costs]
-        print(f"| {n:g} |", *shown, flush=True)
+        cells = (f"{c.counted:.1f} → {c.time:.0f} ({c.time / c.counted:.1f})" for c in costs)
+        print_row(f"{n:g}", *cells)
 
 
 def by_pressure(points: int, path: Path, repeats: int) -> None:
@@ -104,7 +105,7 @@ def by_grid(sizes: list[int], path: Path, repeats: int) -> None:
     draw("points along a side", curves, np.array(sizes), limit, path)
 
 
-def draw(label, curves, x, limit, path: Path) -> None:  # type: ignore[no-untyped-def]
+def draw(label: str, curves: Curves, x: np.ndarray, limit: np.ndarray, path: Path) -> None:
     """Write a PNG, and print its values."""
     with styled():
         plot = ColumnFigure(label, COSTS)

@@ -7,10 +7,12 @@ python scripts/depth.py --folder results/theory
 """
 
 import argparse
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-from gamma_fit import print_table, spread
+from gamma_fit import spread
+from markdown_tables import print_table
 from theory_studies import LIGHT, run_with_studies
 
 from gfmd_cli.analysis.compare import Curve, compare
@@ -19,6 +21,7 @@ from gfmd_cli.physics.discretisation_error import AREA_EXCESS
 
 Groups = dict[tuple[float, float], list[Curve]]
 """The curves of all seeds by n, and lambda_r / lambda_s or points per lambda_s."""
+Measure = Callable[[Curve], np.ndarray]
 
 
 def over_theory(curve: Curve, name: str) -> np.ndarray:
@@ -38,7 +41,7 @@ def gap_error(curve: Curve) -> np.ndarray:
     return -100 * np.log(over_theory(curve, "u_g"))
 
 
-def print_trend(title: str, groups: Groups, measure, digits: int) -> None:  # type: ignore[no-untyped-def]
+def print_trend(title: str, groups: Groups, measure: Measure, digits: int) -> None:
     """One row for each n and pressure, one column for each lambda_r / lambda_s."""
     exponents, depths = (sorted(set(keys)) for keys in zip(*groups, strict=True))
     rows = []

@@ -2,7 +2,8 @@
 
     python scripts/direct_solutions.py [--points 512 1024 2048] [--exponents 3 4]
 
-Self-affine surfaces with lambda_s / L = `--cutoff`, tolerance 1e-6. Columns:
+Self-affine surfaces with lambda_s / L = `--cutoff`, tolerance 1e-6. The columns, of which
+docs/solver_measurements.md has a table:
 
     points in contact, status, natural residual
     K u        estimated rounding of the stress K u + p: its natural residual
@@ -20,6 +21,7 @@ import argparse
 import mpmath
 import numpy as np
 import scipy.fft
+from markdown_tables import print_head, print_row
 
 from gfmd_cli.physics.contact import Contact
 from gfmd_cli.physics.elastomers import Power
@@ -28,6 +30,7 @@ from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.solvers.auto import Auto
 from gfmd_cli.solvers.nested_grids import Solution, solve_contact
 
+COLUMNS = ("in contact", "status", "residual", "K u", "sigma", "u", "outside", "stress")
 TOLERANCE = 1e-6
 DIGITS = 40
 Extended = np.longdouble
@@ -94,18 +97,15 @@ def main() -> None:
     parser.add_argument("--cutoff", type=float, default=0.1)
     parser.add_argument("--seeds", type=int, nargs="+", default=[0])
     arguments = parser.parse_args()
-    head = "n | points a side | p* | seed | in contact | status | residual | K u | sigma | u"
-    print(f"| {head} | outside | stress |")
-    print("| --- " * 12 + "|")
+    print_head("n", "points a side", "p*", "seed", *COLUMNS)
     for n in arguments.exponents:
         for points in arguments.points:
             for seed in arguments.seeds:
                 surface = SelfAffine(cutoff=arguments.cutoff, seed=seed)
                 scene = build_scene(surface, Power(n=n), points)
                 for p_star in arguments.p_star:
-                    cells = [f"{n:g}", f"{points}", f"{p_star:g}", f"{seed}"]
-                    cells += row(scene.contact(p_star))
-                    print("| " + " | ".join(cells) + " |", flush=True)
+                    cells = row(scene.contact(p_star))
+                    print_row(f"{n:g}", points, f"{p_star:g}", seed, *cells)
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
 """The weight W of the elastic energy, measured by shell.
 
 W(p, q) = |u(q)|^2 / |h(q)|^2 is what Persson theory replaces by [gamma + (1 - gamma) a_r^2] a_r at
-the scale q (paper Eqs. (29), (30)).
+the scale q (paper Eqs. (29), (30)). Prints a table of docs/energy_weights.md.
 
 python scripts/energy_weights.py results/energy_weights.jsonl     # ten minutes on one core
 """
@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from markdown_tables import print_head, print_row
 from scipy.special import erf
 
 from gfmd_cli.physics.contact import Scene
@@ -38,14 +39,7 @@ Record = dict[str, Any]
 
 def scene_of(kind: str, n: float, seed: int, points: int = POINTS) -> Scene:
     hurst, spectrum = KINDS[kind]
-    cut = spectrum == "cutoff"
-    surface = SelfAffine(
-        hurst=hurst,
-        rolloff=ROLLOFF,
-        cutoff=CUTOFF,
-        spectrum="cutoff" if cut else "rolloff",
-        seed=seed,
-    )
+    surface = SelfAffine(hurst=hurst, rolloff=ROLLOFF, cutoff=CUTOFF, spectrum=spectrum, seed=seed)
     return build_scene(surface, Power(n=n), points)
 
 
@@ -97,12 +91,8 @@ def theory_weights(kind: str, n: float, p: float, gamma: float) -> list[float]:
 def print_weights(records: list[Record]) -> None:
     """W by group beside Eq. (30), and the energy beyond the waves of the surface."""
     middles = np.sqrt(groups()[1:] * groups()[:-1])
-    print(
-        "\n| surface | n | p* | "
-        + " | ".join(f"qL/2π = {m:.3g}" for m in middles)
-        + " | energy beyond qₛ |"
-    )
-    print("| --- " * (4 + GROUPS) + "|")
+    heads = (f"qL/2π = {m:.3g}" for m in middles)
+    print_head("surface", "n", "p*", *heads, "energy beyond qₛ")
     for kind, n, (i, p) in product(KINDS, EXPONENTS, enumerate(PRESSURES)):
         chosen = [r for r in records if (r["kind"], r["n"]) == (kind, n)]
         if len(chosen) < 2:
@@ -111,7 +101,7 @@ def print_weights(records: list[Record]) -> None:
         theory = theory_weights(kind, n, p, float(gamma_n(n)))
         cells = [f"{w:.3f} ({s:.3f})" for w, s in zip(fractions.mean(axis=0), theory, strict=True)]
         beyond = np.mean([r["beyond"][i] for r in chosen])
-        print(f"| {kind} | {n:g} | {p:g} | " + " | ".join(cells) + f" | {100 * beyond:.1f} % |")
+        print_row(kind, f"{n:g}", f"{p:g}", *cells, f"{100 * beyond:.1f} %")
 
 
 def main() -> None:
@@ -121,6 +111,7 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=SEEDS, help="seeds, from 0 on")
     parser.add_argument("--no-run", action="store_true", help="use what is there")
     arguments = parser.parse_args()
+    arguments.cache.parent.mkdir(parents=True, exist_ok=True)
     lines = arguments.cache.read_text().splitlines() if arguments.cache.exists() else []
     cases = list(product(range(arguments.seeds), KINDS, EXPONENTS))
     for seed, kind, n in [] if arguments.no_run else cases[len(lines) :]:

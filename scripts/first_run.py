@@ -2,7 +2,8 @@
 
     NUMBA_CACHE_DIR=$(mktemp -d) python scripts/first_run.py
 
-Default surface, 512^2, n = 1, p* = 0.1. The cache of compiled code must be empty, as above.
+Default surface, 512^2, n = 1, p* = 0.1; docs/performance.md has the sum. The cache of compiled code
+must be empty, as above.
 """
 
 import time

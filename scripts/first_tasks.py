@@ -15,6 +15,8 @@ import sys
 import tempfile
 from pathlib import Path
 
+from markdown_tables import print_head, print_row
+
 ROOT = Path(__file__).parents[1]
 PAGE = ROOT / "docs" / "tutorial.md"
 RUNS = 2
@@ -47,9 +49,9 @@ def main() -> None:
             shutil.copytree(ROOT / "configs", folder / "configs")
             for title, commands in questions().items():
                 seconds.setdefault(title, []).append(processor_seconds(commands, folder))
-    print("| question | commands | processor seconds |\n| --- | --- | --- |")
+    print_head("question", "commands", "processor seconds")
     for title, commands in questions().items():
-        print(f"| {title} | {len(commands)} | {min(seconds[title]):.1f} |")
+        print_row(title, len(commands), f"{min(seconds[title]):.1f}")
 
 
 if __name__ == "__main__":

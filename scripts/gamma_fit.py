@@ -8,12 +8,13 @@ python scripts/gamma_fit.py --folder results/theory --figure docs/figures/gamma
 """
 
 import argparse
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from itertools import product
 from pathlib import Path
 
 import numpy as np
+from markdown_tables import print_table
 from scipy.optimize import curve_fit, minimize_scalar
 from theory_studies import EXPONENTS, HURST, LIGHT, SPECTRA, TEST, TRAINING, run_with_studies
 
@@ -145,13 +146,6 @@ def fit(surfaces: dict[Key, Surface], springs: list[float], without: str = "") -
         scatter.append(np.std(usable, ddof=1))
     n = np.array([0, *EXPONENTS])
     return np.asarray(curve_fit(smooth, n, mean, [0.4, 1.5, 0.1], scatter, absolute_sigma=True)[0])
-
-
-def print_table(title: str, heads: list[str], rows: Iterator[list[str]] | list[list[str]]) -> None:
-    print(f"\n{title}\n")
-    print("| " + " | ".join(heads) + " |\n|" + " --- |" * len(heads))
-    for row in rows:
-        print("| " + " | ".join(row) + " |")
 
 
 def print_grids(surfaces: dict[Key, Surface]) -> None:

@@ -7,10 +7,12 @@ python scripts/gap_stiffness.py --folder results/theory --figures docs/figures
 """
 
 import argparse
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from gamma_fit import GAMMA, mean_gap, print_table, smooth, spread
+from gamma_fit import GAMMA, mean_gap, smooth, spread
+from markdown_tables import print_table
 from theory_studies import EXPONENTS, LADDER, SHOWN, TRAINING, run_with_studies
 
 from gfmd_cli.analysis.compare import Curve, compare
@@ -24,20 +26,25 @@ from gfmd_cli.physics.persson import Shells, gamma_n
 GRIDS = (256, 512, 1024)
 GRID = 512
 P_STAR = np.array(LADDER)
+DIFFERENCES = (0.2, 0.6)
+"""p* from and to which differences of u_g are compared with the stiffness."""
 ALL_EXPONENTS = [0.0, *EXPONENTS]
 Curves = dict[tuple[float, int, int], Curve]
 """By n, points a side and seed."""
 
 
-def read(path: Path) -> Curves:
-    curves = compare(path).curves
+def by_grid(curves: Sequence[Curve]) -> Curves:
     return {(c.n, int(c.rows[0]["points"]), int(c.rows[0]["seed"])): c for c in curves}
+
+
+def surface_of(curve: Curve) -> tuple[str, float]:
+    return curve.rows[0]["spectrum"], curve.rows[0]["hurst"]
 
 
 def column(curves: Curves, n: float, name: str, points: int = GRID) -> np.ndarray:
     """Of all seeds of one grid: seeds, pressures."""
-    held = {seed: curve for (m, side, seed), curve in curves.items() if (m, side) == (n, points)}
-    return np.array([held[seed].column(name) for seed in sorted(held)])
+    seeds = {seed: curve for (m, side, seed), curve in curves.items() if (m, side) == (n, points)}
+    return np.array([seeds[seed].column(name) for seed in sorted(seeds)])
 
 
 def compliance(curves: Curves, n: float, points: int = GRID) -> np.ndarray:
@@ -102,14 +109,11 @@ def print_stiffness(curves: Curves) -> None:
 
 def print_surfaces(path: Path) -> None:
     """u_0 of two more surfaces, and the error of Eq. (39) in brackets."""
-    by_key: dict[tuple, list[Curve]] = {}
-    for curve in compare(path).curves:
-        row = curve.rows[0]
-        by_key.setdefault((row["spectrum"], row["hurst"], curve.n), []).append(curve)
+    groups = grouped(compare(path).curves, lambda c: (*surface_of(c), c.n))
     rows = []
-    for key, held in sorted(by_key.items()):
-        p_star, shells = held[0].column("p_star"), held[0].persson.shells
-        u_0 = np.array([p_star / curve.column("stiffness") for curve in held])
+    for key, group in sorted(groups.items()):
+        p_star, shells = group[0].column("p_star"), group[0].persson.shells
+        u_0 = np.array([p_star / curve.column("stiffness") for curve in group])
         theory = theory_compliance(shells, float(np.squeeze(gamma_n(key[2]))), p_star)
         cells = [
             "{:.3f} ± {:.3f}".format(*spread(u_0[:, i])) + f" ({100 * (ratio - 1):+.0f} %)"
@@ -122,10 +126,12 @@ def print_surfaces(path: Path) -> None:
 
 def print_differences(curves: Curves) -> None:
     """-dp/du_g against differences of u_g between neighbouring pressures."""
-    print("\nu_g(p_i) - u_g(p_i+1) over the integral of 1/kappa dp between 0.2 and 0.8, all seeds")
+    low, high = DIFFERENCES
+    title = f"u_g(p_i) - u_g(p_i+1) over the integral of 1/kappa dp, p* = {low:g} to {high:g}"
+    print(f"\n{title}, all seeds")
     for n in ALL_EXPONENTS:
         u_g, kappa = column(curves, n, "u_g"), column(curves, n, "stiffness")
-        pairs = [i for i in range(P_STAR.size - 1) if P_STAR[i] >= 0.2 and P_STAR[i + 1] <= 0.6]
+        pairs = [i for i in range(P_STAR.size - 1) if low <= P_STAR[i] and P_STAR[i + 1] <= high]
         ratios = []
         for i in pairs:
             step = np.log(P_STAR[i + 1] / P_STAR[i])
@@ -151,8 +157,8 @@ def thresholds(curves: Curves, n: float, points: int, values: np.ndarray) -> np.
     """
     ends = np.empty((len(values), 2))
     for place, name in enumerate(("percolates_x", "percolates_y")):
-        for seed, held in enumerate(column(curves, n, name, points)):
-            last = np.flatnonzero(held == 1)[-1]
+        for seed, percolates in enumerate(column(curves, n, name, points)):
+            last = np.flatnonzero(percolates == 1)[-1]
             ends[seed, place] = (values[seed, last] + values[seed, last + 1]) / 2
     return ends
 
@@ -162,13 +168,13 @@ def print_percolation(curves: Curves) -> None:
     for n in ALL_EXPONENTS:
         cells = [f"{n:g}"]
         for points in GRIDS:
-            held = areas(curves, n, points)
-            counted = column(curves, n, "a_r", points)
-            finest = slice(0, 4)  # the seeds of the finest grid
-            ends = [thresholds(curves, n, points, one)[finest].mean() for one in (counted, held)]
+            counted, corrected = column(curves, n, "a_r", points), areas(curves, n, points)
+            common = slice(0, len(column(curves, n, "a_r", GRIDS[-1])))  # seeds of all grids
+            ends = [thresholds(curves, n, points, a)[common].mean() for a in (counted, corrected)]
             cells.append("{:.3f} ({:.3f})".format(*ends))
-        for held in (areas(curves, n, GRID), column(curves, n, "u_g"), np.tile(P_STAR, (16, 1))):
-            ends = thresholds(curves, n, GRID, held)
+        values = areas(curves, n, GRID), *(column(curves, n, name) for name in ("u_g", "p_star"))
+        for each in values:
+            ends = thresholds(curves, n, GRID, each)
             cells.append("{:.3f} ± {:.3f}".format(*spread(ends.mean(axis=1))))
         rows.append(cells)
     heads = ["n", *(f"{points}^2" for points in GRIDS), "a_r, 512^2, 16 seeds", "u_g", "p*"]
@@ -193,13 +199,10 @@ def print_on_four_grids(curves: Curves) -> None:
 def print_on_surfaces(path: Path) -> None:
     """Where the gap stops percolating on several surfaces, mean over seeds and directions."""
     rows = []
-    by_surface = grouped(
-        compare(path).curves, lambda c: (c.rows[0]["spectrum"], c.rows[0]["hurst"])
-    )
-    for key, held in by_surface.items():
-        curves = {(c.n, int(c.rows[0]["points"]), int(c.rows[0]["seed"])): c for c in held}
-        for n in sorted({c.n for c in held}):
-            cells = [f"{one}" for one in (*key, n, sum(c.n == n for c in held))]
+    for key, group in grouped(compare(path).curves, surface_of).items():
+        curves = by_grid(group)
+        for n in sorted({c.n for c in group}):
+            cells = [f"{one}" for one in (*key, n, sum(c.n == n for c in group))]
             for values in (areas(curves, n, GRID), column(curves, n, "p_star")):
                 ends = thresholds(curves, n, GRID, values).mean(axis=1)
                 cells.append("{:.3f} ± {:.3f}".format(*spread(ends)))
@@ -236,12 +239,12 @@ def main() -> None:
     parser.add_argument("--folder", type=Path, default=Path("results/theory"))
     parser.add_argument("--figures", type=Path, default=Path("docs/figures"))
     arguments = parser.parse_args()
-    curves = read(arguments.folder / "stiffness.h5")
+    curves = by_grid(compare(arguments.folder / "stiffness.h5").curves)
     print_stiffness(curves)
     print_surfaces(arguments.folder / "surfaces.h5")
     print_differences(curves)
     print_percolation(curves)
-    print_on_four_grids(read(arguments.folder / "percolation.h5"))
+    print_on_four_grids(by_grid(compare(arguments.folder / "percolation.h5").curves))
     print_on_surfaces(arguments.folder / "thresholds.h5")
     draw(curves, arguments.figures)
 

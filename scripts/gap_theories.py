@@ -1,9 +1,10 @@
 """Theories of the mean gap on surfaces that no constant was fitted to.
 
-Compares Eq. (39), the fitted gamma(n), weights W of two contact areas, and coarse-graining. Prints
-the constants of gfmd_cli/physics/gap_theories.py. Reads the studies `gamma`, `further`,
-`between`, `stiffness`, `surfaces`, `depth` and `slab` of scripts/theory_studies.py, and the
-weights by shell of scripts/energy_weights.py.
+Compares Eq. (39), the fitted gamma(n), weights W of two contact areas, and coarse-graining: the
+tables of docs/mean_gap.md and docs/energy_weights.md. Prints the constants of
+gfmd_cli/physics/gap_theories.py. Reads the studies `gamma`, `further`, `between`, `stiffness`,
+`surfaces`, `depth` and `slab` of scripts/theory_studies.py, and the weights by shell of
+scripts/energy_weights.py.
 
 python scripts/gap_theories.py --folder results/theory --weights results/energy_weights.jsonl
 """
@@ -27,18 +28,19 @@ from gamma_fit import (
     P_STAR,
     Key,
     Surface,
-    print_table,
     read,
     rms,
     spectrum_of,
     spread,
 )
 from gamma_fit import smooth as gamma
+from markdown_tables import print_table
 from scipy.optimize import least_squares
 from scipy.special import erf
 from theory_studies import EXPONENTS, HURST, SHOWN, SPECTRA, run_with_studies
 
 from gfmd_cli.analysis.compare import Curve, Theory, compare, einstein_prediction, theory_of
+from gfmd_cli.analysis.selection import grouped
 from gfmd_cli.physics.persson import Shells, gamma_n
 
 NODES = np.geomspace(3e-4, 8, 300)
@@ -243,12 +245,13 @@ def print_further(path: Path) -> None:
 
 def means(path: Path, points: int | None = None) -> Iterator[tuple[list[Curve], np.ndarray]]:
     """Curves of one surface and elastomer, and the mean of their ln u_g over the seeds."""
-    by_key = defaultdict(list)
-    for curve in compare(path).curves:
+
+    def key(curve: Curve) -> tuple:
         row = curve.rows[0]
-        if points in (None, row["points"]):
-            by_key[curve.n, -row["cutoff"], row["spectrum"], row["hurst"]].append(curve)
-    for _, curves in sorted(by_key.items()):
+        return curve.n, -row["cutoff"], row["spectrum"], row["hurst"]
+
+    on_grid = (c for c in compare(path).curves if points in (None, c.rows[0]["points"]))
+    for _, curves in sorted(grouped(on_grid, key).items()):
         yield curves, np.mean([np.log(curve.column("u_g")) for curve in curves], axis=0)
 
 

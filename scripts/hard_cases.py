@@ -1,4 +1,4 @@
-"""Contacts that are hard to solve: one table, natural residual 1e-6 for all.
+"""Contacts that are hard to solve: the table of docs/hard_cases.md, natural residual 1e-6 for all.
 
     python scripts/hard_cases.py [--points 512] [--only WORDS] > table.md
 
@@ -27,6 +27,7 @@ from pathlib import Path
 
 import exact_solutions as reference
 import numpy as np
+from markdown_tables import print_head, print_row
 
 from gfmd_cli.physics.contact import Contact
 from gfmd_cli.physics.elastomers import Elastomer, Power, Slab, Tabulated
@@ -229,8 +230,8 @@ def solve(
     return Result(contact, solution, status, seconds, observe(contact, solution.u, solution.sigma))
 
 
-def row(case: Case, points: int, seconds: float) -> str:
-    """One line of the table."""
+def row(case: Case, points: int, seconds: float) -> list[str]:
+    """The cells of one case."""
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         contact = case.contact(points)
@@ -246,7 +247,7 @@ def row(case: Case, points: int, seconds: float) -> str:
             off = f"{abs(observables.u_g - exact) / max(exact, TINY):.1e}"
     if caught:
         status += f" ({len(caught)} warnings: {caught[0].message})"
-    cells = [
+    return [
         case.name,
         f"{contact.grid.points}" + ("^2" if contact.grid.dimension == 2 else ""),
         case.exponent,
@@ -261,7 +262,6 @@ def row(case: Case, points: int, seconds: float) -> str:
         off,
         "-" if solution.is_direct else f"{floor:.0e}{reach}",
     ]
-    return "| " + " | ".join(cells) + " |"
 
 
 def main() -> None:
@@ -270,13 +270,13 @@ def main() -> None:
     parser.add_argument("--only", default="", help="cases whose name contains this")
     parser.add_argument("--seconds", type=float, default=30.0, help="for one solve")
     arguments = parser.parse_args()
-    print("| " + " | ".join(HEAD) + " |\n" + "| --- " * len(HEAD) + "|")
+    print_head(*HEAD)
     solve(build_scene(SelfAffine(cutoff=0.1), Power(n=3), 64).contact(0.1))  # loads the kernels
     with tempfile.TemporaryDirectory() as name:
         write_inputs(Path(name), arguments.points)
         for case in cases(arguments.points, Path(name)):
             if arguments.only in str(case):
-                print(row(case, arguments.points, arguments.seconds), flush=True)
+                print_row(*row(case, arguments.points, arguments.seconds))
 
 
 if __name__ == "__main__":

@@ -1,10 +1,12 @@
 """How well the exact identities of the contact problem hold on the default surface.
 
+    python scripts/identities.py        # the table of docs/verification.md
+
 2 v = <sigma h> - p <u>;  -dv/du_g = p;  integral of u_g dp = v + p u_g between two pressures, which
 becomes v_full over all pressures. Prints one line for each elastomer.
 """
 
-import sys
+import argparse
 
 import numpy as np
 
@@ -16,18 +18,24 @@ from gfmd_cli.solvers.auto import Auto
 from gfmd_cli.solvers.nested_grids import solve_contact
 
 EXPONENTS = (0.0, 0.5, 1.0, 2.0, 3.0, 4.0)
+TOLERANCE = 1e-8
 PANELS = 12  # in ln p, four Gauss points each
 STEP = 0.002  # relative, of the central difference in p
 
 
-def main(points: int = 512, tolerance: float = 1e-8) -> None:
-    print(f"default surface, {points}^2, tolerance {tolerance:g}, p* from 0.01 to 3")
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("--points", type=int, default=512)
+    parser.add_argument("--cutoff", type=float, default=SelfAffine().cutoff, help="lambda_s / L")
+    parser.add_argument("--exponents", type=float, nargs="+", default=EXPONENTS)
+    options = parser.parse_args()
+    surface, solver = SelfAffine(cutoff=options.cutoff), Auto(tolerance=TOLERANCE)
+    print(f"{options.points}^2, tolerance {TOLERANCE:g}, p* from 0.01 to 3")
     print("   n  |2v/(<sigma h> - p<u>) - 1|  |-dv/du_g / p - 1|  |int u_g dp / [v + p u_g] - 1|")
-    for n in EXPONENTS:
-        scene = build_scene(SelfAffine(), Power(n=n), points)
-        solver = Auto(tolerance=tolerance)
+    for n in options.exponents:
+        scene = build_scene(surface, Power(n=n), options.points)
 
-        def observables_at(p, scene=scene, solver=solver):
+        def observables_at(p, scene=scene):
             contact = scene.contact(float(p))
             solution = solve_contact(contact, solver)
             assert solution.status == "converged"
@@ -56,4 +64,4 @@ def main(points: int = 512, tolerance: float = 1e-8) -> None:
 
 
 if __name__ == "__main__":
-    main(*map(int, sys.argv[1:2]))
+    main()

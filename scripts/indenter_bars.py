@@ -1,5 +1,7 @@
 """How often the error bars of single indenters hold: shapes, exponents, pressures on small grids.
 
+    python scripts/indenter_bars.py --pressures 6 --shift 1.37     # a table of docs/calibration.md
+
 Each contact is solved at pressures in Pa on grids whose halves give the change, and on a reference
 grid that is at least four times finer. A bar holds if it contains the continuum value of the
 reference grid, after it was widened by the error of that value, at most by a fifth of the bar.
@@ -111,18 +113,18 @@ def main() -> None:
     parser.add_argument("--pressures", type=int, default=8, help="number of pressures")
     parser.add_argument("--shift", type=float, default=1.0, help="factor of the pressures")
     parser.add_argument("--units", action="store_true")
-    chosen = parser.parse_args()
-    if chosen.units:
-        print_units(list(changes_of_unit(chosen.points, chosen.exponents)))
+    options = parser.parse_args()
+    if options.units:
+        print_units(list(changes_of_unit(options.points, options.exponents)))
         return
     print("shape | " + " | ".join(QUANTITIES))
-    for surfaces, finest in ((LINES, chosen.line_reference), (ROUND, chosen.round_reference)):
+    for surfaces, finest in ((LINES, options.line_reference), (ROUND, options.round_reference)):
         for surface in surfaces:
             held = defaultdict(list)
-            for n in chosen.exponents:
-                factor = chosen.shift * 3.0 ** (n - 1)
-                pressures = list(factor * np.geomspace(LIGHTEST, HEAVIEST, chosen.pressures))
-                coarse = measured(surface, n, pressures, chosen.points)
+            for n in options.exponents:
+                factor = options.shift * 3.0 ** (n - 1)
+                pressures = list(factor * np.geomspace(LIGHTEST, HEAVIEST, options.pressures))
+                coarse = measured(surface, n, pressures, options.points)
                 for name, holds in scores(coarse, measured(surface, n, pressures, [finest])):
                     held[name].append(holds)
             label = ", ".join(map(str, surface.values()))

@@ -3,7 +3,8 @@
 Self-affine profiles of 64 points, periodic, with a roll-off at a quarter of the cell and the Hurst
 exponents 0.3 and 0.8; 7, 14 or 25 waves in the cell; p* from 0.01 to 1. Contacts on 128 and 256
 points, each with its error bars from two grids, are compared with 4096 points. With --free the
-profiles are halves of such profiles of 128 points, with a free boundary.
+profiles are halves of such profiles of 128 points, with a free boundary. The commands print the
+numbers of docs/calibration.md.
 
 python scripts/line_bars.py --seeds 30
 python scripts/line_bars.py --free --seeds 20 --exponents 0.5 0.75 1 --finest 1024

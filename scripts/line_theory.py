@@ -2,13 +2,14 @@
 
 Self-affine profiles of H = 0.8, in the continuum; the error is the standard error over the seeds.
 
-python scripts/line_theory.py --seeds 20
+python scripts/line_theory.py --seeds 20     # the table of docs/theory.md
 """
 
 import argparse
 import warnings
 
 import numpy as np
+from markdown_tables import print_head, print_row
 from scipy.special import erf
 
 from gfmd_cli import solve
@@ -31,8 +32,7 @@ def main() -> None:
     parser.add_argument("--points", type=int, default=32, help="per shortest wave")
     arguments = parser.parse_args()
     warnings.simplefilter("ignore")
-    print(f"| λr/λs, L/λr | n | {' | '.join(f'p* = {p:g}' for p in PRESSURES)} |")
-    print(f"|{' --- |' * (2 + len(PRESSURES))}")
+    print_head("λr/λs, L/λr", "n", *(f"p* = {p:g}" for p in PRESSURES))
     for rolloff, highest in PROFILES:
         heights = [profile(seed, rolloff, highest) for seed in range(arguments.seeds)]
         for n in EXPONENTS:
@@ -49,7 +49,7 @@ def main() -> None:
                 ratios = np.array(areas) / erf(p_star / np.sqrt(2))
                 error = ratios.std(ddof=1) / np.sqrt(len(ratios))
                 cells.append(f"{ratios.mean():.2f} ± {error:.2f}")
-            print(f"| {highest / rolloff:g}, {rolloff} | {n:g} | {' | '.join(cells)} |", flush=True)
+            print_row(f"{highest / rolloff:g}, {rolloff}", f"{n:g}", *cells)
 
 
 if __name__ == "__main__":

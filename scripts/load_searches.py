@@ -2,9 +2,9 @@
 
     python scripts/load_searches.py [--accuracy]
 
-Default surface with lambda_s / L = 0.02, means over seeds that were not used to choose the search.
-With `--accuracy` the load is a continuum value, and the search measures errors. The single solve is
-always one on one grid.
+The table of docs/performance.md: default surface with lambda_s / L = 0.02, means over seeds that
+were not used to choose the search. With `--accuracy` the load is a continuum value, and the search
+measures errors. The single solve is always one on one grid.
 """
 
 import argparse
@@ -13,12 +13,12 @@ import os
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
+from markdown_tables import print_head, print_row
 
 from gfmd_cli.api import solve
 
 LOADS = {"contact_area": (0.01, 0.05, 0.3), "mean_gap": (1.5, 0.5)}
 EXPONENTS = (0.5, 1, 2, 3)
-ROW = "| {} |"
 
 
 def transforms(n: float, points: int, seed: int, **tables: dict[str, float]) -> tuple[float, float]:
@@ -41,8 +41,7 @@ def main() -> None:
     parser.add_argument("--accuracy", action="store_true", help="add a table [accuracy]")
     arguments = parser.parse_args()
     tables = {"accuracy": {"mean_gap": 0.5}} if arguments.accuracy else {}
-    print(ROW.format(" | ".join(["load", *(f"n = {n:g}" for n in EXPONENTS)])))
-    print(ROW.format(" | ".join(["---"] * (1 + len(EXPONENTS)))))
+    print_head("load", *(f"n = {n:g}" for n in EXPONENTS))
     for name, values in LOADS.items():
         for value in values:
             ratios = []
@@ -54,7 +53,7 @@ def main() -> None:
                     alone, _ = transforms(*case, load={"p_star": p_star})
                     of_seeds.append(searched / alone)
                 ratios.append(f"{np.mean(of_seeds):.1f}")
-            print(ROW.format(" | ".join([f"`{name} = {value:g}`", *ratios])), flush=True)
+            print_row(f"`{name} = {value:g}`", *ratios)
 
 
 if __name__ == "__main__":

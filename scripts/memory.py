@@ -1,10 +1,19 @@
-"""Peak memory of a task, measured, against what `gfmd run --dry-run` predicts, as a table."""
+"""Peak memory of a task, measured, against what `gfmd run --dry-run` predicts, as a table.
 
+    python scripts/memory.py 4096       # the table of docs/reliability.md
+
+The arguments are numbers of points per side.
+"""
+
+import argparse
 import resource
 import subprocess
 import sys
 import tempfile
+from itertools import chain
 from pathlib import Path
+
+from markdown_tables import print_head, print_row
 
 from gfmd_cli.spec.parse import read_spec
 from gfmd_cli.study.tasks import plan
@@ -58,15 +67,17 @@ CASES = {
 RATIO = 0.9  # predicted over measured, from which a row is marked
 
 
-def main(*sizes: str) -> None:
-    points = [int(size) for size in sizes] or [1024, 2048, 4096]
-    print("| |" + "".join(f" {n}²: measured [MiB] | predicted | ratio |" for n in points))
-    print("| --- |" + " --- | --- | --- |" * len(points))
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("points", type=int, nargs="*", help="default: 1024 2048 4096")
+    points = parser.parse_args().points or [1024, 2048, 4096]
+    heads = ((f"{n}²: measured [MiB]", "predicted", "ratio") for n in points)
+    print_head("", *chain.from_iterable(heads))
     for name, overrides in CASES.items():
-        print(f"| {name} |", *(row(overrides, n) for n in points), flush=True)
+        print_row(name, *chain.from_iterable(cells(overrides, n) for n in points))
 
 
-def row(overrides: list[str], points: int) -> str:
+def cells(overrides: list[str], points: int) -> tuple[str, str, str]:
     """Measured and predicted memory of one case on one grid, and their ratio."""
     with tempfile.TemporaryDirectory() as folder:
         spec = Path(folder) / "spec.toml"
@@ -78,7 +89,7 @@ def row(overrides: list[str], points: int) -> str:
     measured = 1024.0 * int(done.stdout)
     ratio = predicted / measured
     mark = "" if ratio >= RATIO else " low"
-    return f"{measured / 2**20:.0f} | {predicted / 2**20:.0f} | {ratio:.2f}{mark} |"
+    return f"{measured / 2**20:.0f}", f"{predicted / 2**20:.0f}", f"{ratio:.2f}{mark}"
 
 
 def measure(spec: str, *overrides: str) -> None:
@@ -92,4 +103,4 @@ def measure(spec: str, *overrides: str) -> None:
 
 
 if __name__ == "__main__":
-    measure(*sys.argv[2:]) if sys.argv[1:2] == ["measure"] else main(*sys.argv[1:])
+    measure(*sys.argv[2:]) if sys.argv[1:2] == ["measure"] else main()

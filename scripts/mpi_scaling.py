@@ -1,6 +1,8 @@
 """Strong and weak scaling of runs under MPI: a pair of transforms, a V-cycle, a solve.
 
-python scripts/mpi_scaling.py starts mpiexec for each count of processes; the least of many repeats
+    python scripts/mpi_scaling.py       # the table of docs/mpi.md
+
+Starts mpiexec (`pip install -e ".[mpi]"`) for each count of processes; the least of many repeats
 counts, as the machine may be shared. All times are wall times on the slowest process.
 """
 

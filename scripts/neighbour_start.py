@@ -1,7 +1,8 @@
 """Ten pressures on one surface: starts from the neighbouring pressure against new starts.
 
 A start from the neighbour begins on the tiles around its contact, with its pressure; see
-gfmd_cli/solvers/local_start.py. Transforms, and processor seconds of the faster of two solves.
+gfmd_cli/solvers/local_start.py. Prints transforms, and processor seconds of the faster of two
+solves: a table of docs/solver_measurements.md.
 
     python scripts/neighbour_start.py --points 1024 --p-star 0.001 0.01
 """

@@ -90,7 +90,7 @@ def warned(heights: Field, folder: Path, words: tuple[str, ...]) -> bool:
     return any(each in text for each in words)
 
 
-def contacts(seeds: int, sizes: list[int]) -> None:
+def contacts(seeds: int, sizes: list[int], _: Path) -> None:
     """Errors of gradient, contact area, mean gap and sigma_p due to white noise."""
     for points in sizes:
         print(f"{points}^2: level, errors of gradient, a_r, mean gap, sigma_p; those with a filter")
@@ -185,8 +185,8 @@ def sound(seeds: int, sizes: list[int], folder: Path) -> None:
             number = counts.setdefault(name, [0, 0])
             number[0] += 1
             number[1] += warned(heights, folder, NOISE)
-    for name, (number, found) in counts.items():
-        print(f"{name:36}{number:6}{found:6}")
+    for name, (number, with_warning) in counts.items():
+        print(f"{name:36}{number:6}{with_warning:6}")
 
 
 def random_profile(
@@ -230,12 +230,12 @@ def of_profiles(seeds: int, sizes: list[int], folder: Path) -> None:
         for name, each in counts.items():
             print(f"{name:36}{len(each):6}{sum(each):6}")
         for level in LEVELS:
-            found = []
+            answers = []
             for _, hurst in product(range(seeds), HURST[1:]):
                 sound = random_profile(points, hurst, 0.5, 8, random)
                 noise = noise_like(sound[None], level) * random.normal(size=points)
-                found.append(warned(sound + noise, folder, NOISE))
-            print(f"noise {level:5}: {np.mean(found):.0%}", flush=True)
+                answers.append(warned(sound + noise, folder, NOISE))
+            print(f"noise {level:5}: {np.mean(answers):.0%}", flush=True)
 
 
 def with_noise(seeds: int, sizes: list[int], folder: Path) -> None:
@@ -243,7 +243,7 @@ def with_noise(seeds: int, sizes: list[int], folder: Path) -> None:
     for (name, add), points in product(NOISES.items(), sizes):
         print(f"{name}, {points}^2: H, lambda_s in points; level " + " ".join(map(str, LEVELS)))
         for hurst, cutoff in product((0.3, 0.5, 0.8, 1.0), (2, 8)):
-            found = [
+            fractions = [
                 np.mean(
                     [
                         warned(add(surface(seed), level, np.random.default_rng(seed)), folder, ALL)
@@ -253,26 +253,28 @@ def with_noise(seeds: int, sizes: list[int], folder: Path) -> None:
                 for surface in [partial(scan, points, hurst, 0.5, cutoff)]
                 for level in LEVELS
             ]
-            print(f"{hurst:4}{cutoff:4}" + "".join(f"{value:6.0%}" for value in found), flush=True)
+            cells = "".join(f"{value:6.0%}" for value in fractions)
+            print(f"{hurst:4}{cutoff:4}{cells}", flush=True)
+
+
+TABLES = {
+    "contacts": contacts,
+    "filters": filters,
+    "sound": sound,
+    "noisy": with_noise,
+    "profiles": of_profiles,
+}
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("tables", nargs="*", default=["contacts", "filters", "sound", "noisy"])
+    parser.add_argument("tables", nargs="*", choices=[[], *TABLES], default=[])
     parser.add_argument("--points", type=int, nargs="+", default=[128, 256])
     parser.add_argument("--seeds", type=int, default=8)
     arguments = parser.parse_args()
     with TemporaryDirectory() as folder:
-        for table in arguments.tables:
-            if table == "contacts":
-                contacts(arguments.seeds, arguments.points)
-            else:
-                {
-                    "filters": filters,
-                    "sound": sound,
-                    "noisy": with_noise,
-                    "profiles": of_profiles,
-                }[table](arguments.seeds, arguments.points, Path(folder))
+        for table in arguments.tables or TABLES:
+            TABLES[table](arguments.seeds, arguments.points, Path(folder))
 
 
 if __name__ == "__main__":

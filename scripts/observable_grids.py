@@ -8,8 +8,10 @@ python scripts/observable_grids.py            # docs/observables.md
 """
 
 import argparse
+from itertools import product
 
 import numpy as np
+from markdown_tables import print_head, print_row
 
 from gfmd_cli import solve
 
@@ -35,16 +37,15 @@ def values(n: float, p_star: float, seed: int, points: int) -> list[float]:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--seeds", type=int, nargs="+", default=[0, 1, 2, 10, 11, 12])
-    contacts = [(p_star, seed) for p_star in PRESSURES for seed in parser.parse_args().seeds]
-    print(f"| n | points per lambda_s | {' | '.join(NAMES)} |\n{'| --- ' * (2 + len(NAMES))}|")
+    contacts = list(product(PRESSURES, parser.parse_args().seeds))
+    print_head("n", "points per lambda_s", *NAMES)
     for n in EXPONENTS:
         of_grids = [[values(n, *contact, points) for contact in contacts] for points in GRIDS]
-        for points, found in zip(GRIDS[:-1], of_grids, strict=False):
-            ratio = np.array(found) / of_grids[-1]
+        for points, of_grid in zip(GRIDS[:-1], of_grids, strict=False):
+            ratio = np.array(of_grid) / of_grids[-1]
             ends = zip(ratio.min(axis=0), ratio.max(axis=0), strict=True)
             cells = (f"{low:.3g} – {high:.3g}" for low, high in ends)
-            waves = POINTS_PER_WAVE * points // GRIDS[-1]
-            print(f"| {n:g} | {waves} | {' | '.join(cells)} |", flush=True)
+            print_row(f"{n:g}", POINTS_PER_WAVE * points // GRIDS[-1], *cells)
 
 
 if __name__ == "__main__":

@@ -4,7 +4,7 @@
     python scripts/paper_figures.py -o results/paper --quick    # minutes, small grids
 
 Studies are resumed where they were stopped. Figures are written as PDF and PNG, the statements as
-a page of Markdown.
+a page of Markdown: docs/paper.md with `--page`.
 """
 
 import argparse

@@ -1,6 +1,6 @@
 """Contact areas of plates (n > 3.5) on nested grids, and whether the bars of the program hold.
 
-python scripts/plate_areas.py results/plate_areas.jsonl     # a quarter of an hour on one core
+    python scripts/plate_areas.py results/plates.jsonl      # a quarter of an hour on one core
 
 Each case is one contact with 2 to 96 points per lambda_s. The constants of
 `physics/discretisation_error.py` were fitted to one half; the table shows both.
@@ -16,8 +16,9 @@ from typing import NamedTuple
 import numpy as np
 from calibration import KEYS, Case, measure
 
-from gfmd_cli.physics.discretisation_error import GridValues, RoughnessScales, estimate
+from gfmd_cli.physics.discretisation_error import RoughnessScales, estimate
 from gfmd_cli.physics.elastomers import Power
+from gfmd_cli.physics.error_estimates import GridValues
 from gfmd_cli.physics.self_affine import SelfAffine
 
 COUNT = 48
@@ -43,12 +44,12 @@ def cases(seed: int) -> Iterator[Case]:
         modes = int(draw.choice([5, 6, 7]))
         hurst = float(draw.choice([0.3, 0.5, 0.8, 1.0]))
         rolloff = float(draw.choice([0.25, 0.5, 1.0]))
-        cut = draw.choice(["rolloff", "cutoff"]) == "cutoff"
+        spectrum = str(draw.choice(["rolloff", "cutoff"]))
         surface = SelfAffine(
             hurst=hurst,
             rolloff=rolloff,
             cutoff=1 / modes,
-            spectrum="cutoff" if cut else "rolloff",
+            spectrum=spectrum,
             seed=int(draw.integers(1, 10**6)),
         )
         base = 2 * round(modes * float(draw.choice([1.0, 1.25, 1.5])))
@@ -83,6 +84,7 @@ def main() -> None:
         help=f"{FITTED}: the constants were fitted to every second case of this set",
     )
     arguments = parser.parse_args()
+    arguments.cache.parent.mkdir(parents=True, exist_ok=True)
     done = arguments.cache.read_text().splitlines() if arguments.cache.exists() else []
     for case in [] if arguments.no_run else list(cases(arguments.seed))[len(done) :]:
         done.append(json.dumps(measure(case, tolerance=1e-5), default=str))

@@ -1,5 +1,7 @@
 """The generated parts of the reference: keys of the run spec, commands, columns of a study.
 
+    python scripts/reference_pages.py
+
 A page keeps what is written by hand; between `<!-- generated: NAME -->` and `<!-- end -->` stands
 what NAME makes. The JSON Schema of the run spec is written too. With --check the files are
 compared instead.

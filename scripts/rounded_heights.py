@@ -30,9 +30,9 @@ def results(scene: Scene, height: Field) -> Field:
     other = reduce_scene(scene.grid, height * scene.h_std, HalfSpace())
     contact = other.contact(pressure / other.delta_sigma)
     solution = solve_contact(contact, Auto(tolerance=1e-5))
-    seen = observe(contact, solution.u, solution.sigma)
-    gap, deviation = seen.u_g * other.h_std, seen.sigma_p * other.delta_sigma
-    return np.array([other.delta_sigma, seen.a_r, gap, deviation])
+    observables = observe(contact, solution.u, solution.sigma)
+    gap, deviation = observables.u_g * other.h_std, observables.sigma_p * other.delta_sigma
+    return np.array([other.delta_sigma, observables.a_r, gap, deviation])
 
 
 def main() -> None:

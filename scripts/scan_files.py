@@ -5,7 +5,8 @@
 FOLDER can be `test/file_format_examples` of the repository of SurfaceTopography. The table has a
 row for each file of which SurfaceTopography itself reads a map or a line profile; names of all
 other files follow. Each file has a process of its own, in which most packages are loaded. Seconds
-are those of both commands, as elapsed and as processor time; --limit stops a file.
+are those of both commands, as elapsed and as processor time; --limit stops a file. The table of
+docs/map_evidence.md.
 """
 
 import argparse
@@ -19,6 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from click.testing import CliRunner
+from markdown_tables import print_head, print_row
 
 import gfmd_cli.study.run  # noqa: F401  # loads the packages once
 from gfmd_cli.cli import main
@@ -95,7 +97,7 @@ def run() -> None:
     parser.add_argument("--only", nargs="+", default=[""], help="parts of the names of files")
     parser.add_argument("--limit", type=float, help="seconds after which a file is given up")
     arguments = parser.parse_args()
-    print("| file | points | " + " | ".join(HEADS) + " |\n" + "| --- " * (len(HEADS) + 2) + "|")
+    print_head("file", "points", *HEADS)
     unread = []
     for path in sorted(arguments.folder.iterdir()):
         if path.suffix in UNCHECKED or not any(word in path.name for word in arguments.only):
@@ -107,9 +109,7 @@ def run() -> None:
         with tempfile.TemporaryDirectory() as folder:
             row = solved_within(path, folder, arguments.limit)
         points = " x ".join(str(n) for n in shape if n > 1)
-        print(
-            f"| {' | '.join([path.name, points, *(row.get(h, '') for h in HEADS)])} |", flush=True
-        )
+        print_row(path.name, points, *(row.get(head, "") for head in HEADS))
     print(f"\nNot read by SurfaceTopography: {', '.join(unread) or 'none'}", file=sys.stderr)
 
 

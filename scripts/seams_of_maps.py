@@ -2,9 +2,10 @@
 
     python scripts/seams_of_maps.py [--points 64 128 256] [--seeds 20]
 
-The surfaces are self-affine, plateau-honed, worn, turned, ground and noisy. Maps are stitched of
-two tiles with an offset (without one only the warning of seams counts, with one also the others
-about lines), or every second line is displaced by some points (only the warning of this counts).
+The table of docs/map_evidence.md. The surfaces are self-affine, plateau-honed, worn, turned, ground
+and noisy. Maps are stitched of two tiles with an offset (without one only the warning of seams
+counts, with one also the others about lines), or every second line is displaced by some points
+(only the warning of this counts).
 """
 
 import argparse
@@ -85,14 +86,14 @@ def main() -> None:
     with TemporaryDirectory() as folder:
         for points in arguments.points:
             for damage, damaged, words in DAMAGES:
-                found: dict[str, list[bool]] = {}
+                answers: dict[str, list[bool]] = {}
                 for seed in range(arguments.seeds):
                     random = np.random.default_rng([points, seed])
                     for name, heights in sound(points, random):
                         is_warned = warned(damaged(heights, random=random), Path(folder), words)
-                        found.setdefault(name, []).append(is_warned)
-                kinds = ", ".join(f"{name} {np.mean(each):.1%}" for name, each in found.items())
-                every = np.concatenate(list(found.values()))
+                        answers.setdefault(name, []).append(is_warned)
+                kinds = ", ".join(f"{name} {np.mean(each):.1%}" for name, each in answers.items())
+                every = np.concatenate(list(answers.values()))
                 print(f"{points}^2, {damage}: {np.mean(every):.1%} of {len(every)}; {kinds}")
 
 

@@ -20,6 +20,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 from calibration import IRREGULAR, irregular_map
+from markdown_tables import print_head, print_row
 
 from gfmd_cli.api import solve
 from gfmd_cli.errors import InputError
@@ -131,16 +132,15 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--finer", type=int, default=16, help="finest grid over the coarsest")
     parser.add_argument("--verbose", action="store_true", help="print each case")
-    found = list(results(parser.parse_args()))
-    print("| kind | load: quantity | grids | held | unknown | bar/error |")
-    print("| --- | --- | --- | --- | --- | --- |")
-    for group in sorted({entry[:3] for entry in found}):
-        bars = [(error, bar) for *key, error, bar in found if tuple(key) == group]
+    entries = list(results(parser.parse_args()))
+    print_head("kind", "load: quantity", "grids", "held", "unknown", "bar/error")
+    for group in sorted({entry[:3] for entry in entries}):
+        bars = [(error, bar) for *key, error, bar in entries if tuple(key) == group]
         given = [(error, bar) for error, bar in bars if np.isfinite(bar)]
         held = sum(error <= bar for error, bar in given)
         ratio = np.median([bar / max(error, 1e-12) for error, bar in given] or [np.nan])
         counts = f"{held}/{len(given)}", len(bars) - len(given), f"{ratio:.1f}"
-        print(f"| {' | '.join(map(str, (*group, *counts)))} |")
+        print_row(*group, *counts)
 
 
 if __name__ == "__main__":

@@ -5,14 +5,15 @@ with some of its seeds). From a study of one grid, only the intervals are tested
 are compared with all others: the 95 % confidence interval of the mean on the finest grid, and the
 standard error of ln Pr that is extrapolated from the three coarser grids, with the finest three of
 the others. The difference is reduced by the share that the others have in its scatter. "worst" is
-the lowest share of a bin that half of the groups resolve.
+the lowest share of a bin that half of the groups resolve. The results are in
+docs/stress_distribution.md (first study) and docs/calibration.md (second study).
 
-gfmd run configs/stress-distribution.toml -o study.h5 --set "surface.seed=[0, ..., 39]" \
+gfmd run configs/stress-distribution.toml -o study.h5 --set "surface.seed=[$(seq -s, 0 39)]" \
     --set surface.cutoff=0.1 --set "elastomer.n=[1,2,3]" --set solver.tolerance=1e-5 \
     --set "grid.points=[128,256,512,1024]"
 python scripts/seed_coverage.py study.h5
 
-gfmd run configs/smoke.toml -o means.h5 --set "surface.seed=[0, ..., 199]" \
+gfmd run configs/smoke.toml -o means.h5 --set "surface.seed=[$(seq -s, 0 199)]" \
     --set surface.cutoff=0.0625 --set "elastomer.n=[0.5,1,2,3,4]" --set grid.points=64 \
     --set "load.p_star=[0.003,0.01,0.03,0.1,0.3,1]" --set solver.tolerance=1e-4
 python scripts/seed_coverage.py means.h5
@@ -25,6 +26,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from markdown_tables import print_head, print_row
 
 from gfmd_cli import rows
 from gfmd_cli.analysis.compare import Curve
@@ -38,7 +40,7 @@ SIZES, GROUPINGS = (1, 2, 3, 4, 8), 20
 
 def distribution(seeds: Seeds, grids: slice) -> StressDistribution:
     """Pr(sigma) of some seeds, from some of their grids."""
-    return StressDistribution(Curve(seeds[0], None), [rows[grids] for rows in seeds])
+    return StressDistribution(Curve(seeds[0], None), [contacts[grids] for contacts in seeds])
 
 
 def held(group: Seeds, others: Seeds) -> dict[str, Any]:
@@ -51,8 +53,8 @@ def held(group: Seeds, others: Seeds) -> dict[str, Any]:
         answers["Pr"] = np.where(np.isfinite(change), share * change <= density.error, np.nan)
     if len(group) > 1:
         for name in QUANTITIES:
-            spread = spread_of([rows[-1][name] for rows in group])
-            change = abs(spread.mean - np.mean([rows[-1][name] for rows in others]))
+            spread = spread_of([contacts[-1][name] for contacts in group])
+            change = abs(spread.mean - np.mean([contacts[-1][name] for contacts in others]))
             answers[name] = share * change <= spread.half_width
     return answers
 
@@ -66,10 +68,10 @@ def main() -> None:
         for row in rows(path):
             contacts[row["n"], round(row["p_star"], 9)][row["seed"]].append(row)
     sigma, draw = geometric_middles(LOGARITHMIC_EDGES), np.random.default_rng(0)
-    print(f"| n | p* | seeds | {' | '.join(QUANTITIES)} | Pr(sigma) | worst |\n{'| --- ' * 8}|")
+    print_head("n", "p*", "seeds", *QUANTITIES, "Pr(sigma)", "worst")
     for (n, p_star), by_seed in contacts.items():
         seeds = [sorted(each, key=lambda row: row["points"]) for each in by_seed.values()]
-        for size in SIZES:
+        for size in (size for size in SIZES if size < len(seeds)):
             answers = defaultdict(list)
             for _ in range(GROUPINGS if size > 1 else 1):
                 order = draw.permutation(len(seeds))
@@ -87,7 +89,7 @@ def main() -> None:
             if resolved.size:
                 density, shares = f"{np.nanmean(bins):.0%}", np.nanmean(bins[:, resolved], axis=0)
                 worst = f"{shares.min():.0%} at {sigma[resolved[shares.argmin()]]:.2g}"
-            print(f"| {n:g} | {p_star:g} | {size} | {' | '.join(cells)} | {density} | {worst} |")
+            print_row(f"{n:g}", f"{p_star:g}", size, *cells, density, worst)
 
 
 if __name__ == "__main__":

@@ -7,7 +7,7 @@
 Default surface with lambda_s = L/50. A solve that ends without a last recomputation of sigma keeps
 the rounding of its updates, and that of a start on tiles (`--on-tiles`). The true error is the rms
 difference to sigma = K u + p; the estimate is that by which the solve ends
-(`gfmd_cli/solvers/loop.py`). One row for each n.
+(`gfmd_cli/solvers/loop.py`). One row for each n; docs/solver_measurements.md has the range.
 """
 
 import argparse
@@ -16,6 +16,7 @@ from math import hypot
 from typing import ClassVar
 
 import numpy as np
+from markdown_tables import print_head, print_row
 
 from gfmd_cli.physics.contact import Contact
 from gfmd_cli.physics.elastomers import Power
@@ -69,8 +70,7 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, nargs="+", default=[0])
     parser.add_argument("--on-tiles", action="store_true")
     options = parser.parse_args()
-    print("| n | solves | ended without recomputation | error over estimate |")
-    print("| --- | --- | --- | --- |")
+    print_head("n", "solves", "ended without recomputation", "error over estimate")
     for n in options.exponents:
         ratios = []
         for points, seed in product(options.points, options.seeds):
@@ -81,7 +81,7 @@ def main() -> None:
                 ratios.append(ratio(contact, state))
         known = [value for value in ratios if value is not None]
         span = f"{min(known):.2g} to {max(known):.2g}" if known else ""
-        print(f"| {n:g} | {len(ratios)} | {len(known)} | {span} |", flush=True)
+        print_row(f"{n:g}", len(ratios), len(known), span)
 
 
 if __name__ == "__main__":

@@ -16,22 +16,16 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 from ast import literal_eval
 from importlib import import_module
 from math import inf, isfinite
-from typing import ClassVar
 from unittest.mock import patch
 
 import numpy as np
+from markdown_tables import print_head, print_row
+from small_contacts import WholeGrids
 
 from gfmd_cli.physics.elastomers import Power
 from gfmd_cli.physics.scenes import build_scene
 from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.solvers.nested_grids import solve_contact
-from gfmd_cli.solvers.pcg import ProjectedCG
-
-
-class WholeGrids(ProjectedCG):
-    """The solver without a start for small contacts."""
-
-    starts_locally: ClassVar[bool] = False
 
 
 def transforms(shape: tuple[int, int], n: float, p_star: float, seed: int) -> float:
@@ -56,8 +50,7 @@ def main() -> None:
     module_name, name = arguments.constant.split(".")
     module = import_module(f"gfmd_cli.solvers.{module_name}")
     present = getattr(module, name)
-    print(f"| points | n | {' | '.join(map(str, arguments.values))} | present: {present} |")
-    print("| --- " * (len(arguments.values) + 3) + "|")
+    print_head("points", "n", *arguments.values, f"present: {present}")
     for points in arguments.points:
         shape = points, round(points / arguments.aspect)
         for n in arguments.exponents:
@@ -68,8 +61,7 @@ def main() -> None:
                     counts.append(np.array([transforms(*case) for case in cases]))
             ratios = [float(np.exp(np.mean(np.log(count / counts[0])))) for count in counts[1:]]
             cells = [f"{ratio:.2f}" if isfinite(ratio) else "-" for ratio in ratios]
-            grid = f"{points} × {shape[1]}"
-            print(f"| {grid} | {n:g} | {' | '.join(cells)} | {counts[0].mean():.0f} |", flush=True)
+            print_row(f"{points} × {shape[1]}", f"{n:g}", *cells, f"{counts[0].mean():.0f}")
 
 
 if __name__ == "__main__":

@@ -1,5 +1,8 @@
 """Self-affine fits of scans with borders: parts of Gaussian rough surfaces with a known spectrum.
 
+    python scripts/spectrum_fits.py
+    python scripts/spectrum_fits.py --search
+
 Prints the table of docs/map_evidence.md: mean and standard deviation over seeds of H, lambda_s,
 lambda_r and the rms height of the fit, the last three relative to those of the whole surface, and
 the median of the standard errors of H that the fits state.

@@ -20,6 +20,7 @@ from tempfile import TemporaryDirectory
 from unittest.mock import patch
 
 import numpy as np
+from markdown_tables import print_head, print_row
 
 from gfmd_cli.physics.elastomers import Tabulated
 from gfmd_cli.physics.scenes import build_scene
@@ -49,8 +50,8 @@ def main() -> None:
     parser.add_argument("--steps", type=int, default=4000)
     arguments = parser.parse_args()
     without_cycle = patch.object(preconditioners, "has_coarser_level", lambda grid: False)
-    print("| k(q) | points | lambda_s / L | p* | with the limit | without | Green's function |")
-    print("| --- | --- | --- | --- | --- | --- | --- |")
+    heads = ("k(q)", "points", "lambda_s / L", "p*")
+    print_head(*heads, "with the limit", "without", "Green's function")
     for law, usual, cutoff, p_star in CASES:
         points = arguments.points or usual
         case = law, points, max(cutoff, 2 / points), p_star, arguments.steps
@@ -58,7 +59,7 @@ def main() -> None:
         for change in (without_limit(), without_cycle):
             with change:
                 numbers.append(transforms(*case))
-        print(f"| {law} | {points}² | {case[2]:g} | {p_star:g} |", " | ".join(numbers), "|")
+        print_row(law, f"{points}²", f"{case[2]:g}", f"{p_star:g}", *numbers)
 
 
 def without_limit() -> AbstractContextManager[object]:

@@ -10,7 +10,7 @@ import argparse
 from pathlib import Path
 
 import numpy as np
-from gamma_fit import print_table
+from markdown_tables import print_table
 from paper.ensembles import groups
 from paper.stress import increment_factors, mean_stress, tail_exponent
 from paper.studies import StoredStudies

@@ -16,8 +16,10 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+from markdown_tables import print_head, print_row
 
 from gfmd_cli import rows, run
+from gfmd_cli.analysis.selection import grouped
 from gfmd_cli.physics import discretisation_error
 from gfmd_cli.physics.observables import QUANTITIES
 
@@ -120,22 +122,20 @@ def errors(heights: np.ndarray, finest: int, folder: Path) -> list[tuple[int, st
     }
     (folder / "study.h5").unlink(missing_ok=True)
     run(spec, folder / "study.h5")
-    contacts = defaultdict(list)
-    for row in rows(folder / "study.h5"):
-        contacts[row["n"], row["load_value"]].append(row)
-    found = []
+    contacts = grouped(rows(folder / "study.h5"), lambda row: (row["n"], row["load_value"]))
+    ratios = []
     for contact in contacts.values():
         *coarse, fine = sorted(contact, key=lambda row: row["points"])
         for grids, row in enumerate(coarse, 1):
             for name in QUANTITIES:
                 error = row[f"{name}_continuum"] - fine[f"{name}_continuum"]
-                found.append((grids, name, abs(error) / row[f"{name}_continuum_error"]))
-    return found
+                ratios.append((grids, name, abs(error) / row[f"{name}_continuum_error"]))
+    return ratios
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("kinds", nargs="*", help="of these kinds only")
+    parser.add_argument("kinds", nargs="*", choices=[[], *KINDS], default=[], metavar="KIND")
     parser.add_argument("--count", type=int, default=4, help="maps of each kind")
     parser.add_argument("--finest", type=int, default=16, help="points over those of the maps")
     parser.add_argument("--laws", action="store_true", help="as if all surfaces were calibrated")
@@ -146,7 +146,7 @@ def main() -> None:
             setattr(discretisation_error, limit, np.inf)
     heads = [f"{grids}: {name}" for grids in (1, 2) for name in QUANTITIES]
     print("bars that hold of those given, largest error over its bar")
-    print(f"| kind | {' | '.join(heads)} |\n{'| --- ' * (len(heads) + 1)}|")
+    print_head("kind", *heads)
     for kind in arguments.kinds or KINDS:
         draw = np.random.default_rng([arguments.seed, list(KINDS).index(kind)])
         ratios = defaultdict(list)
@@ -162,7 +162,7 @@ def main() -> None:
             else "-"
             for head in heads
         ]
-        print(f"| {kind} | {' | '.join(cells)} |", flush=True)
+        print_row(kind, *cells)
 
 
 if __name__ == "__main__":

@@ -33,8 +33,6 @@ LADDER = [0.001, 0.003, 0.01, 0.03, 0.1, 0.2, *(0.01 * x for x in range(25, 65, 
 """Reduced pressures up to the percolation of the contact, where the gap stops percolating."""
 SHOWN = [0.001, 0.003, 0.01, 0.03, 0.1, 0.3, 1.0]
 """Those of the tables of the contact stiffness."""
-
-
 PERCOLATION = [0.01 * x for x in range(34, 68, 2)]
 """Reduced pressures about the percolation of the gap."""
 
@@ -55,7 +53,7 @@ def power(exponents: list[float]) -> str:
 
 def grids(seeds: dict[int, list[int]]) -> tuple[list[int], str]:
     """List of seeds, and the tables that pair it with the points a side, from points: seeds."""
-    pairs = [(seed, points) for points, held in seeds.items() for seed in held]
+    pairs = [(seed, points) for points, of_grid in seeds.items() for seed in of_grid]
     paired = table("[sweep]", paired=["surface.seed", "grid.points"])
     return [seed for seed, _ in pairs], table("[grid]", points=[p for _, p in pairs]) + paired
 
@@ -200,11 +198,12 @@ def main() -> None:
         for number, text in enumerate(STUDIES[name](), 1):
             path = arguments.folder / f"{name}-{number}.toml"
             path.write_text(text.lstrip())
-            resolved, text = read_spec(path, ())
+            spec, source = read_spec(path, ())
             with Reporter(True) as report:
                 store = arguments.folder / f"{name}.h5"
-                outcome = run_study(resolved, text, store, report, RunOptions(jobs=1))
-            print(f"{path.stem}: {dict(outcome)}", flush=True)
+                outcome = run_study(spec, source, store, report, RunOptions(jobs=1))
+            counts = ", ".join(f"{count} {status}" for status, count in outcome.items())
+            print(f"{path.stem}: {counts}", flush=True)
 
 
 if __name__ == "__main__":

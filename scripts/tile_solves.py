@@ -8,7 +8,8 @@ Periodic cell, default surface, one thread. The columns: share of the tiles that
 finest grid; evaluations of the displacement at all points, and steps on the tiles, both on the
 finest grid; natural residual of the start, measured at all points over the prediction on the
 tiles; processor time of a solve on whole grids over that of the solve with tiles, each the smallest
-of `--repeats` times; microseconds that the convolution with the stiffness takes per tile.
+of `--repeats` times; microseconds that the convolution with the stiffness takes per tile. Results,
+and the options for them, are in docs/solver_measurements.md.
 """
 
 import argparse

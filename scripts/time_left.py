@@ -2,7 +2,8 @@
 
     python scripts/time_left.py configs/demo.toml [--set key=value]
 
-At each tenth of the wall time of the run, the estimate that is nearest in time.
+At each tenth of the wall time of the run, the estimate that is nearest in time. A table of
+docs/performance.md.
 """
 
 import argparse

@@ -87,13 +87,13 @@ def scans(points: int, hurst: float, options: argparse.Namespace) -> None:
             tip = radius / second.std()
             seen = sampled(scanned(points * heights, points * tip) / points, len(heights) // step)
             text = warning(seen, pixel, tip)
-            found = re.search(r"shorter than about (\S+) m.*s_filter = (\S+) or", text)
-            length = float(found[1]) / pixel if found else 0.0
+            match = re.search(r"shorter than about (\S+) m.*s_filter = (\S+) or", text)
+            length = float(match[1]) / pixel if match else 0.0
             is_noticed = float(bool(warning(seen, pixel)))
             row = [length, is_noticed, *compared(sign * seen, sign * heights)]
             rows.setdefault((step, radius), []).append(row)
-            if found:
-                cutoff, whole = options.cutoff * float(found[2]), (1 / points, 1 / points)
+            if match:
+                cutoff, whole = options.cutoff * float(match[2]), (1 / points, 1 / points)
                 smooth = gaussian_filter(heights, whole, cutoff, periodic=True)
                 of_map = gaussian_filter(seen, (pixel, pixel), cutoff, periodic=True)
                 row = compared(sign * of_map, sign * smooth)
@@ -116,8 +116,8 @@ def sound(sizes: Sequence[int], seeds: int) -> None:
     for points in sizes:
         made = [pair for seed in range(seeds) for pair in surfaces(points, seed)]
         maps = [(name, heights) for name, heights in made if name != WITHOUT_TIP]
-        found = [name for name, heights in maps if warning(heights, 1.0)]
-        print(f"{points}^2: {len(found)} of {len(maps)} maps give the warning", *found, flush=True)
+        names = [name for name, heights in maps if warning(heights, 1.0)]
+        print(f"{points}^2: {len(names)} of {len(maps)} maps give the warning", *names, flush=True)
 
 
 def main() -> None:

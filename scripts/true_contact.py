@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 from gamma_fit import spread
+from markdown_tables import print_head, print_row
 from scipy.special import erfinv
 from theory_studies import run_with_studies
 
@@ -17,6 +18,7 @@ from gfmd_cli.analysis.compare import VARIANTS, Curve, compare
 from gfmd_cli.analysis.curve_styles import MARKERS, CurveStyle, colours
 from gfmd_cli.analysis.figures import P_STAR
 from gfmd_cli.analysis.plotting import ColumnFigure, styled
+from gfmd_cli.analysis.selection import grouped
 from gfmd_cli.physics.true_contact import contact_area
 
 PERSSON = "whole"
@@ -41,13 +43,6 @@ def needed(curve: Curve) -> np.ndarray:
         return curve.column("p_star") / (np.sqrt(2) * erfinv(np.minimum(simulated(curve), 1)))
 
 
-def by_exponent(path: Path) -> dict[float, list[Curve]]:
-    groups: dict[float, list[Curve]] = {}
-    for curve in compare(path).curves:
-        groups.setdefault(curve.n, []).append(curve)
-    return dict(sorted(groups.items()))
-
-
 def over_seeds(columns: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
     """Mean and standard error, pressure by pressure."""
     return tuple(np.array([spread(list(values)) for values in np.transpose(columns)]).T)
@@ -61,8 +56,7 @@ def print_tables(groups: dict[float, list[Curve]]) -> None:
             f"\nn = {n:g}: Delta_sigma_c / Delta_sigma; a_r of theory / simulated ± standard error"
         )
         names = ["p*", "a_r", "needed", *VARIANTS, PERSSON, *VARIANTS]
-        print("| " + " | ".join(names) + " |")
-        print("| --- " * len(names) + "|")
+        print_head(*names)
         means = [over_seeds([f(c) for c in curves])[0] for f in (simulated, needed)]
         widths = [over_seeds([measured(c, name) for c in curves])[0] for name in VARIANTS]
         ratios = [
@@ -73,7 +67,7 @@ def print_tables(groups: dict[float, list[Curve]]) -> None:
             cells = [f"{p_star[i]:g}", f"{means[0][i]:.4f}", f"{means[1][i]:.3f}"]
             cells += [f"{width[i]:.3f}" for width in widths]
             cells += [f"{mean[i]:.3f} ± {error[i]:.3f}" for mean, error in ratios]
-            print("| " + " | ".join(cells) + " |")
+            print_row(*cells)
 
 
 def draw(groups: dict[float, list[Curve]], path: Path) -> None:
@@ -105,7 +99,8 @@ def main() -> None:
     parser.add_argument("--folder", type=Path, default=Path("results/theory"))
     parser.add_argument("--figure", type=Path, default=Path("docs/figures/true_contact"))
     arguments = parser.parse_args()
-    groups = by_exponent(arguments.folder / "true-contact.h5")
+    curves = compare(arguments.folder / "true-contact.h5").curves
+    groups = dict(sorted(grouped(curves, lambda curve: curve.n).items()))
     print_tables(groups)
     draw(groups, arguments.figure)
 

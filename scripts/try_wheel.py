@@ -1,20 +1,19 @@
 """Build the package and try it where the checkout is not: an empty environment, another folder.
 
-Prints how long each step takes. The distributions are left in dist/.
+`make wheel` calls it. Prints how long each step takes. The distributions are left in dist/.
 """
 
 import os
 import shutil
 import subprocess
 import sys
+import tarfile
 import tempfile
 import time
 import zipfile
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
-DATA = ("run-spec.schema.json", "report/templates/page.html", "report/templates/style.css",
-        "spec/templates/scan.toml", "spec/templates/study.toml")  # fmt: skip
 
 
 def call(*words: object, where: Path) -> str:
@@ -35,12 +34,15 @@ def main() -> None:
     """Build, check, install, use."""
     shutil.rmtree(ROOT / "dist", ignore_errors=True)
     call(sys.executable, "-m", "build", "--outdir", ROOT / "dist", ROOT, where=ROOT)
-    (wheel,) = (ROOT / "dist").glob("*.whl")
+    (wheel,), (archive,) = ((ROOT / "dist").glob(f"*.{end}") for end in ("whl", "tar.gz"))
     call(sys.executable, "-m", "twine", "check", "--strict", *(ROOT / "dist").iterdir(), where=ROOT)
     names = zipfile.ZipFile(wheel).namelist()
-    for name in DATA:
-        assert f"gfmd_cli/{name}" in names, f"{wheel.name} lacks {name}"
+    files = (path for path in (ROOT / "gfmd_cli").rglob("*") if path.is_file())
+    package = {str(path.relative_to(ROOT)) for path in files if path.parent.name != "__pycache__"}
+    assert package <= set(names), f"{wheel.name} lacks {package - set(names)}"
     assert all(name.startswith("gfmd_cli") for name in names), "more than the package"
+    with tarfile.open(archive) as source:
+        assert not any("/tests/" in name for name in source.getnames()), "tests without their data"
     with tempfile.TemporaryDirectory() as folder:
         there = Path(folder)
         call(sys.executable, "-m", "venv", there / "venv", where=there)

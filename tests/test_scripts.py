@@ -1,5 +1,6 @@
 """Every script with a command line starts, and those that take small sizes run on them."""
 
+import re
 import runpy
 import sys
 from pathlib import Path
@@ -20,6 +21,7 @@ SMALL = {
     "economy.py": "--points 400",
     "energy_weights.py": "weights.jsonl --points 128 --seeds 2",
     "hard_cases.py": "--points 32 --only cliff --seconds 1",
+    "identities.py": "--points 32 --cutoff 0.1 --exponents 1",
     "indenter_bars.py": "--points 64 --line-reference 256 --round-reference 128 --exponents 1 "
     "--pressures 1",
     "line_bars.py": "--seeds 1 --exponents 1 --finest 512",
@@ -35,6 +37,7 @@ SMALL = {
     "sigma_rounding.py": "--points 128 --exponents 1 --p-star 0.1",
     "solver_constants.py": "pcg.SELECTION_GROWTH 2 --points 32 --exponents 1 --seeds 3",
     "spectrum_fits.py": "--seeds 1 --hurst 0.8 --rolloffs 20 --pixels 4",
+    "seams_of_maps.py": "--points 64 --seeds 1",
     "scan_files.py": f"{ROOT / 'configs' / 'data'} --limit 60",
     "steep_stiffness.py": "--points 32 --steps 300",
     "searched_pressures.py": "--count 1 --finer 2",
@@ -53,6 +56,15 @@ CONSTANTS = [
     ("spectrum_fits.py", "--search --seeds 1 --hurst 0.8"),
 ]
 """Options with which scripts measure constants of the program, on small sizes."""
+
+
+def test_each_script_is_named_or_imported_somewhere():
+    files = [*ROOT.glob("docs/*.md"), *ROOT.glob("gfmd_cli/**/*.py"), *SCRIPTS.rglob("*.py")]
+    files += [ROOT / name for name in ("CONTRIBUTING.md", "Makefile", "mkdocs.yml")]
+    texts = {path: path.read_text("utf-8") for path in files}
+    for script in SCRIPTS.glob("*.py"):
+        others = "\n".join(text for path, text in texts.items() if path != script)
+        assert re.search(rf"{script.name}|^(from|import) {script.stem}\b", others, re.M), script
 
 
 def run(name, arguments, monkeypatch):

@@ -34,7 +34,6 @@ def plate_map(studies: StoredStudies, folder: Path) -> list[Finding]:
         image, ax=axes, orientation="horizontal", label=r"gap  $/\,h_\mathrm{std}$", extend="max",
         fraction=0.05, pad=0.02,
     )  # fmt: skip
-    folder.mkdir(parents=True, exist_ok=True)
     plot.write(folder / "plate_map")
     return []
 

@@ -1,4 +1,4 @@
-"""What the figures share: the style of a elastomer, values with their errors, a quantity over pressure."""
+"""What the figures share: the style of an elastomer, values with their errors, a quantity over pressure."""
 
 from pathlib import Path
 from typing import Any
@@ -11,10 +11,10 @@ from gfmd_cli.analysis.plotting import ColumnFigure
 from paper.claims import SIGMAS, Value
 
 KNOWN = 0.5  # twice the relative error up to which a value is drawn, else its upper limit
-BODIES = (0.0, 0.5, 1.0, 2.0, 3.0, 4.0)
+EXPONENTS = (0.0, 0.5, 1.0, 2.0, 3.0, 4.0)
 STYLES = {
     n: CurveStyle(colour, MARKERS[i], f"n = {'1/2' if n == 0.5 else f'{n:g}'}")
-    for i, (n, colour) in enumerate(zip(BODIES, colours(len(BODIES)), strict=True))
+    for i, (n, colour) in enumerate(zip(EXPONENTS, colours(len(EXPONENTS)), strict=True))
 }
 Row = dict[str, Any]
 
@@ -52,7 +52,6 @@ def finish(
     plot: ColumnFigure, folder: Path, name: str, x_scale: str, y_scale: str, x: Any, y: Any
 ) -> None:
     """Scales around the values, and both files. A scale of "ratio" is linear and needs no zero."""
-    folder.mkdir(parents=True, exist_ok=True)
     for axis, scale, span in (("x", x_scale, x), ("y", y_scale, y)):
         span = np.asarray(span, dtype=float)
         span = span[np.isfinite(span) & ((span > 0) | (scale != "log"))]

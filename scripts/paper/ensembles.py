@@ -8,6 +8,7 @@ import numpy as np
 
 from gfmd_cli.analysis.compare import Curve, Prediction, in_continuum, solver_of
 from gfmd_cli.analysis.ensemble import without_seed
+from gfmd_cli.analysis.selection import grouped
 from gfmd_cli.grid.arrays import Field
 from paper.claims import Value
 from paper.drawing import slope
@@ -139,10 +140,10 @@ def groups(studies: Any, name: str) -> list[Group]:
 
     Raises ValueError where seeds have different pressures.
     """
-    by_key: dict[tuple[Any, ...], list[Curve]] = {}
-    for curve in studies.comparison(name).curves:
-        row = curve.rows[0]
-        by_key.setdefault((without_seed(row), *solver_of(row)), []).append(curve)
+    by_key = grouped(
+        studies.comparison(name).curves,
+        lambda curve: (without_seed(curve.rows[0]), *solver_of(curve.rows[0])),
+    )
     for curves in by_key.values():
         if any(not np.allclose(c.column("p_star"), curves[0].column("p_star")) for c in curves):
             raise ValueError(f"{name}: seeds at different pressures")

@@ -19,7 +19,6 @@ from paper.studies import StoredStudies, needs
 TAIL = 3e-4  # least gap of the logarithmic representation
 LINEAR = (1.25, 1.75, 2.75)  # p* at which the slope of ln u_g is compared
 STEP = 0.5  # of p* in Fig. 9b
-DEFAULT_WIDTH = 0.1953125  # lambda_r / L of the slabs
 
 
 def _gap_over_pressure(
@@ -208,8 +207,9 @@ def _decades(p: Field, limit: float, u: Field) -> Field:
 
 def _long_waves(curve: Curve) -> float:
     """Rms stress in full contact of the waves up to twice the roll-off, in Delta_sigma."""
-    shells = curve.persson.shells
-    share = shells.variance[shells.q <= 2 * 2 * np.pi * 4].sum() / shells.variance.sum()
+    shells, row = curve.persson.shells, curve.rows[0]
+    q_r = 2 * np.pi / (row["rolloff"] * row["length"])
+    share = shells.variance[shells.q <= 2 * q_r].sum() / shells.variance.sum()
     return float(np.sqrt(share))
 
 
@@ -292,7 +292,8 @@ def fig11(studies: StoredStudies, folder: Path) -> list[Finding]:
     x_label = P_STAR.replace("sigma", "sigma_\\mathrm{si}")
     plot, xs, ys, lines, off = ColumnFigure(x_label, LABELS["u_g"]), [], [], [], {}
     for i, (group, colour) in enumerate(zip(ensembles, colours(len(ensembles)), strict=True)):
-        t = group.first.rows[0]["thickness"] / DEFAULT_WIDTH
+        row = group.first.rows[0]
+        t = row["thickness"] / row["rolloff"]
         name = f"t/λᵣ = {t:.2g}" if np.isfinite(t) else "half-space"
         style = CurveStyle(colour, MARKERS[i], name)
         p, u = group.p, group.best("u_g")

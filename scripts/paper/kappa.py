@@ -7,6 +7,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from gfmd_cli.analysis.plotting import ColumnFigure
+from gfmd_cli.analysis.selection import grouped
 from paper.claims import Finding, Value, by_exponent
 from paper.studies import StoredStudies, needs
 from paper.tips import Tip, spread, stress_fit, style_of, tips
@@ -42,10 +43,7 @@ def kappa_prime(contacts: list[Tip]) -> Value:
 
 
 def _by_exponent(studies: StoredStudies) -> dict[float, list[Tip]]:
-    contacts: dict[float, list[Tip]] = {}
-    for tip in tips(studies, "kappa"):
-        contacts.setdefault(tip.n, []).append(tip)
-    return contacts
+    return grouped(tips(studies, "kappa"), lambda tip: tip.n)
 
 
 @needs("kappa")

@@ -163,8 +163,8 @@ def sizes(studies: StoredStudies) -> str:
         cells = (f"`{name}`", *_wavelengths(rows), grids, surfaces, len(rows), missed, other)
         lines.append([str(cell) for cell in cells])
     width = len(heads) if any(line[-1] for line in lines) else len(heads) - 1
-    table = [heads, ["---"] * len(heads), *lines]
-    return "\n".join(f"| {' | '.join(line[:width])} |" for line in table)
+    lines = [heads, ["---"] * len(heads), *lines]
+    return "\n".join(f"| {' | '.join(line[:width])} |" for line in lines)
 
 
 def write(findings: list[Finding], studies: StoredStudies, figures: Path, target: Path) -> None:

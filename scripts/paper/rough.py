@@ -86,7 +86,7 @@ def fig05(studies: StoredStudies, folder: Path) -> list[Finding]:
     rows = {row["n"]: row for row in studies.rows("fig05")}
     sections = {n: studies.section("fig05", row) for n, row in rows.items()}
     height = sections[0.5]["height"]
-    half = round(WINDOW * 0.005 * height.size / np.sqrt(2))  # lambda_s = 0.005 L
+    half = round(WINDOW * rows[0.5]["cutoff"] * height.size / np.sqrt(2))
     summits = {wide: _highest(height, wide * half) for wide in (1, 2)}  # in lambda_s
     drawn = summits[1] + np.arange(-3 * half, 3 * half + 1)
     x = np.arange(-3 * half, 3 * half + 1) / half * WINDOW
@@ -154,11 +154,12 @@ def fig06(studies: StoredStudies, folder: Path) -> list[Finding]:
         if np.any(high) and group.n <= 3:
             heavy[style.label] = estimate(lambda a: np.abs(a - 1).max(), a.only(high))
         if group.n == 0:
-            springs = einstein_solid.contact_area(einstein_solid.non_contact_height(p))
-            exact = np.abs(springs / group.theory.a_r - 1)[p >= HEAVY].max()
+            theory = group.theory.a_r[p >= HEAVY]
+            exact = einstein_solid.contact_area(einstein_solid.non_contact_height(p[p >= HEAVY]))
+            ratios = (1 - theory) / (1 - exact)
             gaussian = (
-                f" Gaussian heights have {exact:.3f} at n = 0 (Eqs. 36, 38); 1 - a_r itself is 1.7 "
-                "to 2.0 times too large there for p* = 1 to 3."
+                f" Gaussian heights have {np.abs(exact / theory - 1).max():.3f} at n = 0 (Eqs. 36, "
+                f"38); 1 - a_r itself is {ratios.min():.1f} to {ratios.max():.1f} times too large there."
             )
         xs, ys = [*xs, p], [*ys, a.value[known]]
     ratio.axes.axhline(1.0, color="black", lw=0.9)

@@ -11,7 +11,7 @@ from gfmd_cli.analysis.plotting import ColumnFigure
 from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.physics.surfaces import sample
 from paper.claims import Finding, Value
-from paper.drawing import STYLES, column, dense, draw_points, finish, label
+from paper.drawing import STYLES, dense, draw_points, finish, label
 from paper.ensembles import Mean, groups
 from paper.studies import SEEDS, StoredStudies, needs
 
@@ -103,30 +103,36 @@ def large_cell(studies: StoredStudies, folder: Path) -> list[Finding]:
     """u_g over p* in cells of several sizes, mean over seeds."""
     plot, xs, ys, lines = ColumnFigure(P_STAR, LABELS["u_g"]), [], [], []
     ratios = [ratio for ratio in SEEDS if studies.has(f"large_cell_{ratio}")]
-    means: dict[tuple[float, int], tuple[np.ndarray, np.ndarray]] = {}
+    ensembles = {
+        (group.n, ratio): group
+        for ratio in ratios
+        for group in groups(studies, f"large_cell_{ratio}")
+    }
+    means: dict[tuple[float, int], Mean] = {}
     tones = colours(len(ratios))
     for n, filled in ((0.5, True), (1.0, False)):
         for ratio, colour, marker in zip(ratios, tones, MARKERS, strict=False):
-            p, mean, error = _ensemble(studies, ratio, n)
-            means[n, ratio] = mean, error
+            p = ensembles[n, ratio].p
+            mean = means[n, ratio] = ensembles[n, ratio].column("u_g")
             style = CurveStyle(colour, marker, f"{label(n)}, L/λᵣ = {ratio}")
             shown = p * (SHIFTED if filled else 1.0)
-            draw_points(plot, style, shown, mean, error)
+            draw_points(plot, style, shown, mean.value, mean.error)
             if filled:
                 plot.axes.lines[-2].set_markerfacecolor(colour)
                 plot.legend[style.label].set_markerfacecolor(colour)
-            xs, ys = [*xs, shown], [*ys, mean]
-        curve = next(c for c in studies.comparison("large_cell_2").curves if c.n == n)
+            xs, ys = [*xs, shown], [*ys, mean.value]
+        curve = ensembles[n, 2].first
         lines.append((STYLES[n], dense(curve), curve.predict(dense(curve)).u_g))
     plot.theory(lines)
     finish(plot, folder, "large_cell", "log", "linear", np.concatenate(xs), np.concatenate(ys))
     changes, cases = {}, []
-    for (n, ratio), (mean, error) in means.items():
-        first, spread = means[n, 2]
-        cases.append(f"{mean[0]:.3f} ± {error[0]:.3f} ({label(n)}, L/λᵣ = {ratio})")
+    for (n, ratio), mean in means.items():
+        first = means[n, 2]
+        cases.append(f"{mean.value[0]:.3f} ± {mean.error[0]:.3f} ({label(n)}, L/λᵣ = {ratio})")
         if ratio > 2:
-            at = int(np.abs(mean - first).argmax())
-            difference = Value(abs(mean - first)[at], float(np.hypot(error[at], spread[at])))
+            change = np.abs(mean.value - first.value)
+            at = int(change.argmax())
+            difference = Value(change[at], float(np.hypot(mean.error[at], first.error[at])))
             changes[f"{label(n)}, L/λᵣ = {ratio}"] = difference
     names = ", ".join(f"`large_cell_{ratio}`" for ratio in ratios)
     quantity = "largest change of u_g against L = 2 λᵣ, in h_std (a symbol of Fig. 9a: 0.1)"
@@ -137,18 +143,6 @@ def large_cell(studies: StoredStudies, folder: Path) -> list[Finding]:
             f"Studies {names}. u_g/h_std at p* = {p[0]:g}: {', '.join(cases)}.",
         )
     ]
-
-
-def _ensemble(
-    studies: StoredStudies, ratio: int, n: float
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Pressures, mean gap over seeds, and its standard error."""
-    rows = studies.rows(f"large_cell_{ratio}", n=n)
-    p = np.unique(column(rows, "p_star"))
-    each = [column([row for row in rows if row["p_star"] == at], "u_g") for at in p]
-    mean = np.array([u.mean() for u in each])
-    error = np.array([u.std(ddof=1) / np.sqrt(u.size) for u in each])
-    return p, mean, error
 
 
 FIGURES = (fig12, large_cell)

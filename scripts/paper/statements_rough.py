@@ -16,7 +16,7 @@ ROUGH = {
     ),
     "asperity": Statement(
         "Fig. 5, Sect. 5",
-        "In one asperity the n = 1/2 body makes almost perfect contact, the n = 3 body close to its "
+        "In one asperity the n = 1/2 elastomer makes almost perfect contact, the n = 3 elastomer close to its "
         "usual 10 %.",
         (
             Criterion("share in contact at n = 1/2", low=0.9),

@@ -11,6 +11,7 @@ from gfmd_cli.analysis.distribution_figure import DENSITY, STRESS
 from gfmd_cli.analysis.edge_law import edge_exponent, fit_power_law
 from gfmd_cli.analysis.figures import P_STAR
 from gfmd_cli.analysis.plotting import ColumnFigure
+from gfmd_cli.analysis.selection import grouped
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.physics.observables import LOGARITHMIC_EDGES, geometric_middles
 from paper.claims import Finding, Value
@@ -173,10 +174,8 @@ def tail_exponent(sigma: Field, counts: Field) -> Value:
 
 def _by_elastomer(studies: StoredStudies, name: str) -> dict[float, list[Any]]:
     """The distributions of a study by exponent."""
-    groups: dict[float, list[Any]] = {}
-    for distribution in distributions(studies.comparison(name)):
-        groups.setdefault(distribution.curve.n, []).append(distribution)
-    return dict(sorted(groups.items()))
+    by_exponent = grouped(distributions(studies.comparison(name)), lambda one: one.curve.n)
+    return dict(sorted(by_exponent.items()))
 
 
 def _known(distribution: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -75,7 +75,7 @@ STUDIES = {
     "plate_map": Study("plate_map", quick=(SMALL,)),
     **{f"large_cell_{ratio}": _cell(ratio) for ratio in SEEDS},
 }
-LARGE = ("large_cell_8", "large_cell_16", "large_cell_32")  # not in a quick run
+LARGE = ("large_cell_8", "large_cell_16")  # not in a quick run
 
 
 @dataclass

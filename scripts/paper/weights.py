@@ -15,7 +15,7 @@ from paper.ensembles import Mean, estimate, groups
 from paper.studies import StoredStudies, needs
 
 SHOWN = 0.1  # p* of the figure and of the comparison
-BODIES = (0.5, 1.0, 2.0)
+EXPONENTS = (0.5, 1.0, 2.0)
 LONGEST, SHORTEST = (0.9, 2.0), (32.0, 64.1)  # q L / 2 pi of the octaves; lambda_s = L / 64
 
 
@@ -24,7 +24,7 @@ def weights(studies: StoredStudies, folder: Path) -> list[Finding]:
     """W over q beside Eq. (30), mean over the seeds."""
     plot = ColumnFigure(r"wave number  $qL\,/\,2\pi$", r"weight  $W$")
     octaves: dict[tuple[float, float], dict[str, Value]] = {LONGEST: {}, SHORTEST: {}}
-    for n in BODIES:
+    for n in EXPONENTS:
         curves = [curve for curve in studies.comparison("weights").curves if curve.n == n]
         pairs = [_weights(studies, curve) for curve in curves]
         q, energy, theory = pairs[0][0], pairs[0][2], pairs[0][3]
