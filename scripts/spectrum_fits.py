@@ -59,7 +59,7 @@ def fits(folder: Path, seeds: range, hurst: float, rolloff: float, pixels: float
                        fitted.scatter, fitted.hurst_error))  # fmt: skip
     if not values:
         return ["no fit"]
-    mean, deviation = np.nanmean(values, 0), np.nanstd(values, 0)
+    mean, deviation = np.nanmean(values, 0), np.nanstd(values, 0, ddof=1)
     h, s, r, rms, scatter, _ = (f"{m:.3f} ± {d:.3f}" for m, d in zip(mean, deviation, strict=True))
     note = [f"{failed} without fit"] if failed else []
     return [h, f"{np.median(values, 0)[-1]:.3f}", s, r, rms, scatter.partition(" ")[0], *note]

@@ -152,7 +152,7 @@ def random_surfaces(n: float, points: int, hurst: float, seeds: int, maps: Seque
             row = ratios(contacts(seen, spec | {"surface": keys}, loads), true)
             rows.setdefault((name, halvings), []).append(row)
     for (name, halvings), values in rows.items():
-        mean, deviation = np.mean(values, axis=0), np.std(values, axis=0)
+        mean, deviation = np.mean(values, axis=0), np.std(values, axis=0, ddof=1)
         texts = (f"{m:.2f} ({100 * d:.0f})" for m, d in zip(mean, deviation, strict=True))
         print(f"{hurst:3g} {name:11} {halvings}", *texts, flush=True)
 

@@ -36,7 +36,7 @@ SMALL = {
     "rounded_heights.py": "--points 64 --seeds 1",
     "sigma_rounding.py": "--points 128 --exponents 1 --p-star 0.1",
     "solver_constants.py": "pcg.SELECTION_GROWTH 2 --points 32 --exponents 1 --seeds 3",
-    "spectrum_fits.py": "--seeds 1 --hurst 0.8 --rolloffs 20 --pixels 4",
+    "spectrum_fits.py": "--seeds 2 --hurst 0.8 --rolloffs 20 --pixels 4",
     "seams_of_maps.py": "--points 64 --seeds 1",
     "scan_files.py": f"{ROOT / 'configs' / 'data'} --limit 60",
     "steep_stiffness.py": "--points 32 --steps 300",
@@ -47,7 +47,7 @@ SMALL = {
     "transform_work.py": "--points 64",
     "tip_radius.py": "--points 256 --seeds 1 --hurst 0.8 --radii 1",
     "time_left.py": f"{ROOT / 'configs' / 'smoke.toml'} --set grid.points=100 --jobs 1",
-    "unresolved_roughness.py": "--points 512 --seeds 1 --hurst 0.8",
+    "unresolved_roughness.py": "--points 512 --seeds 2 --hurst 0.8 --maps sharp",
 }
 """Arguments with which a script takes seconds."""
 CONSTANTS = [
