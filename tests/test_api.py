@@ -615,3 +615,24 @@ def test_a_forked_process_solves_with_threads_of_its_own(tmp_path):
     words = [sys.executable, "script.py"]
     completed = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert completed.stdout.splitlines() == ["True"], completed.stderr
+
+
+def test_threads_that_read_files_keep_the_filters_of_warnings(tmp_path):
+    """Two threads that change them for a while, one after the other, can leave them changed."""
+    q = np.geomspace(0.1, 1e4, 3000)
+    heights = np.random.default_rng(0).normal(size=(40, 40))
+    heights[:, 5] = np.nan  # a line without heights
+    spec = TABLES | {"grid": {"points": 40}, "load": {"p_star": 0.1}}
+
+    def solve_one(number):
+        table, scan = tmp_path / f"{number}.txt", tmp_path / f"{number}.csv"
+        np.savetxt(table, np.c_[q, q])
+        np.savetxt(scan, heights)
+        surface = {"kind": "file", "path": scan, "length": 1.0, "missing": "fill"}
+        return solve(spec | {"surface": surface, "elastomer": {"kind": "table", "path": table}})
+
+    solve_one(0)  # imports may add filters
+    before = list(warnings.filters)
+    with ThreadPoolExecutor(4) as pool:
+        list(pool.map(solve_one, range(1, 25)))
+    assert warnings.filters == before

@@ -9,7 +9,6 @@ from functools import lru_cache
 from math import ceil
 from pathlib import Path
 from typing import Annotated, ClassVar, Literal, Self
-from warnings import catch_warnings
 
 import numpy as np
 from pydantic import Field as Key
@@ -385,8 +384,8 @@ def _table(path: Path, version: Version) -> Field:
     if path.stat().st_size > MAX_TABLE_BYTES or not path.is_file():
         raise ValueError(f"not a regular file of at most {MAX_TABLE_BYTES} bytes")
     lines = path.read_text("utf-8-sig").translate(SEPARATORS).splitlines()
-    with catch_warnings(action="ignore", category=UserWarning):
-        table = np.loadtxt(lines, ndmin=2)  # warns of an empty file, refused below
+    is_empty = not any(line.partition("#")[0].strip() for line in lines)
+    table = np.empty((0, 0)) if is_empty else np.loadtxt(lines, ndmin=2)
     if table.shape[0] < 2 or table.shape[1] != 2:
         raise InputError(
             f"{path}: elastomer.path: {table.shape[0]} rows, {table.shape[1]} columns; "
