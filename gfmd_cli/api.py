@@ -184,6 +184,9 @@ def solve(spec: Path | str | Tables, *, heights: Any = None, threads: int = 1) -
             return _solve(_with_map(_without_numpy(spec), path, keys), threads)
         except InputError as error:  # the file is not the caller's
             raise InputError(str(error).replace(str(path), "heights")) from None
+        finally:  # no other call can use what is kept of this file
+            forget_files()
+            forget_scenes()
 
 
 def _with_map(tables: Tables, path: Path, keys: Tables) -> Tables:

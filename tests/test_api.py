@@ -1,3 +1,4 @@
+import gc
 import re
 import runpy
 import signal
@@ -16,6 +17,7 @@ import pytest
 import gfmd_cli
 from gfmd_cli import compare, dataset, rows, run, solve
 from gfmd_cli.errors import InputError
+from gfmd_cli.physics.contact import Scene
 from gfmd_cli.physics.error_estimates import Verdict
 from gfmd_cli.study.signals import interruptible, signal_handlers
 
@@ -636,3 +638,18 @@ def test_threads_that_read_files_keep_the_filters_of_warnings(tmp_path):
     with ThreadPoolExecutor(4) as pool:
         list(pool.map(solve_one, range(1, 25)))
     assert warnings.filters == before
+
+
+def test_nothing_is_kept_that_no_other_call_can_use(tmp_path):
+    """Grids of a study have its plans, and those of an array its heights: large arrays."""
+
+    def scenes():
+        gc.collect()
+        return [each for each in gc.get_objects() if isinstance(each, Scene)]
+
+    others = scenes()
+    run(TABLES, tmp_path / "a.h5")
+    assert len(scenes()) == len(others)
+    height = np.random.default_rng(0).normal(size=(64, 64))
+    solve(TABLES | {"surface": {"length": 1.0}, "load": {"p_star": 0.1}}, heights=height)
+    assert len(scenes()) == len(others)
