@@ -19,7 +19,7 @@ from gfmd_cli import compare, dataset, rows, run, solve
 from gfmd_cli.errors import InputError
 from gfmd_cli.physics.contact import Scene
 from gfmd_cli.physics.error_estimates import Verdict
-from gfmd_cli.study.signals import interruptible, signal_handlers
+from gfmd_cli.study.signals import SIGNALS, interruptible, signal_handlers
 
 TABLES = {
     "surface": {"kind": "self-affine", "cutoff": 0.05, "h_std": 1e-6, "length": 1e-3},
@@ -653,3 +653,22 @@ def test_nothing_is_kept_that_no_other_call_can_use(tmp_path):
     height = np.random.default_rng(0).normal(size=(64, 64))
     solve(TABLES | {"surface": {"length": 1.0}, "load": {"p_star": 0.1}}, heights=height)
     assert len(scenes()) == len(others)
+
+
+def test_signals_that_a_program_blocks_stay_blocked(tmp_path):
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGUSR1])
+    try:
+        run(TABLES | {"load": {"pressure": [1e6, 2e6]}}, tmp_path / "a.h5", jobs=2)
+        assert signal.pthread_sigmask(signal.SIG_BLOCK, []) == before | {signal.SIGUSR1}
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def test_signals_of_a_program_around_python_stay_its_own(monkeypatch):
+    """Of their handlers, as R has them for SIGUSR1, Python only knows that they are not its own."""
+    known = signal.getsignal
+    monkeypatch.setattr(signal, "getsignal", lambda n: None if n == signal.SIGUSR1 else known(n))
+    before = {number: known(number) for number in SIGNALS}
+    with signal_handlers(Event(), may_exit=False):
+        changed = {number for number in SIGNALS if known(number) != before[number]}
+    assert changed == set(SIGNALS) - {signal.SIGUSR1}
