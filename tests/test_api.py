@@ -1,4 +1,5 @@
 import gc
+import os
 import re
 import runpy
 import signal
@@ -85,6 +86,18 @@ def test_files_that_have_changed_are_read_again(tmp_path):
         assert read.a_r == pytest.approx(again.a_r, abs=1e-3)
         factors = [result.columns["short_wave_factor"] for result in (read, again)]
         assert factors[0] == pytest.approx(factors[1], rel=1e-6)
+
+
+def test_a_table_that_changes_within_a_tick_of_the_clock_is_read_again(tmp_path):
+    """Lustre, for example, has times in whole seconds."""
+    path, q = tmp_path / "table.txt", np.geomspace(0.1, 1e4, 50)
+    spec = TABLES | {"elastomer": {"kind": "table", "path": path}, "load": {"p_star": 0.1}}
+    areas = []
+    for exponent in (1.0, 2.0):
+        np.savetxt(path, np.c_[q, q**exponent])
+        os.utime(path, (1, 1))
+        areas.append(solve(spec).a_r)
+    assert areas[0] != areas[1]
 
 
 def test_theory_stands_beside_a_study(tmp_path):
@@ -617,6 +630,43 @@ def test_a_forked_process_solves_with_threads_of_its_own(tmp_path):
     words = [sys.executable, "script.py"]
     completed = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert completed.stdout.splitlines() == ["True"], completed.stderr
+
+
+FORKED_WHILE_PLANNING = """
+import multiprocessing
+from threading import Event, Thread
+from gfmd_cli import solve
+from gfmd_cli.grid import plans
+
+SPEC = {
+    "surface": {"kind": "wave"},
+    "elastomer": {"kind": "half-space"},
+    "grid": {"points": 64},
+    "load": {"p_star": 0.1},
+}
+solve(SPEC)
+planning, end = Event(), Event()
+
+def plan(fftw):
+    planning.set()
+    end.wait(0.5)
+
+Thread(target=plans.planned_transforms, args=(plan,)).start()
+planning.wait()
+child = multiprocessing.get_context("fork").Process(target=lambda: print(solve(SPEC).status))
+child.start()
+child.join(60)
+child.kill()
+"""
+
+
+def test_a_process_forked_while_a_thread_plans_can_solve(tmp_path):
+    (tmp_path / "script.py").write_text(FORKED_WHILE_PLANNING)
+    words, variables = [sys.executable, "script.py"], os.environ | {"GFMD_PLANS": "estimated"}
+    completed = subprocess.run(
+        words, cwd=tmp_path, env=variables, capture_output=True, text=True, check=False
+    )
+    assert completed.stdout.splitlines() == ["converged"], completed.stderr
 
 
 def test_threads_that_read_files_keep_the_filters_of_warnings(tmp_path):

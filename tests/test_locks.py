@@ -1,6 +1,7 @@
 import errno
 import fcntl
 import json
+import multiprocessing
 import os
 import signal
 import socket
@@ -83,6 +84,18 @@ def test_a_second_process_does_not_get_a_lock_until_it_is_left(lock, kind, holde
     process.communicate("\n")
     with locked(lock, wait=False) as acquired:
         assert acquired
+
+
+def test_a_forked_process_does_not_keep_a_lock(lock):
+    with locked(lock):
+        child = multiprocessing.get_context("fork").Process(target=time.sleep, args=(60,))
+        child.start()
+    try:
+        with locked(lock, wait=False) as is_held:
+            assert is_held
+    finally:
+        child.kill()
+        child.join()
 
 
 def test_the_lock_of_a_killed_process_is_free(lock, kind, holder):

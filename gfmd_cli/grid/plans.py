@@ -21,7 +21,7 @@ from contextvars import ContextVar
 from functools import cache, partial
 from math import ceil
 from pathlib import Path
-from threading import Lock
+from threading import RLock
 from types import SimpleNamespace
 from typing import Any, NamedTuple, TypeVar
 
@@ -76,7 +76,11 @@ def _here() -> dict[str, str]:
 
 
 _without_lock: set[Path] = set()  # folders that this process could not lock
-_planner = Lock()  # FFTW does not protect its wisdom, which all threads share
+_planner = RLock()  # FFTW does not protect its wisdom, which all threads share
+os.register_at_fork(
+    before=_planner.acquire, after_in_parent=_planner.release, after_in_child=_planner.release
+)
+"""A fork waits until no thread plans: in its process the lock would never be released."""
 _always_estimated = os.environ.get("GFMD_PLANS") == "estimated"
 
 
@@ -109,13 +113,13 @@ def plan_with(
     with _planner:
         _forget()
         _without_lock.clear()
-    if folder is None or _is_estimated():
-        return None
-    with _planning_lock(folder):
-        wisdom = read_wisdom(folder)
-        damaged = wisdom is None and _path(folder).exists()
-        if wisdom is None and (known := read_wisdom(cache_folder())) is not None:
-            _write(folder, known)
+        if folder is None or _is_estimated():
+            return None
+        with _planning_lock(folder):
+            wisdom = read_wisdom(folder)
+            damaged = wisdom is None and _path(folder).exists()
+            if wisdom is None and (known := read_wisdom(cache_folder())) is not None:
+                _write(folder, known)
     if not damaged:
         return None
     return f"{_path(folder)}: damaged; transforms are planned anew, last bits may differ"

@@ -22,6 +22,7 @@ from gfmd_cli.maps.interpolation import monotone_cubic
 from gfmd_cli.physics.compliance_transforms import Compliance, separated
 from gfmd_cli.physics.contact import Scene
 from gfmd_cli.physics.free_compliance import Spacings
+from gfmd_cli.physics.indenters import surface_cache
 from gfmd_cli.physics.linear_elastomer import LinearElastomer
 from gfmd_cli.physics.persson import gamma_slab
 from gfmd_cli.spec_table import FilePath, Positive
@@ -378,7 +379,7 @@ def _read_table(path: Path) -> Field:
         ) from error
 
 
-@lru_cache(maxsize=4)
+@surface_cache(maxsize=4)
 def _table(path: Path, version: Version) -> Field:
     """The columns of a table in this version; cached, because every block of rows asks for k."""
     if path.stat().st_size > MAX_TABLE_BYTES or not path.is_file():
