@@ -13,11 +13,13 @@ from threading import Event
 
 import h5py
 import numpy as np
+import pyfftw
 import pytest
 
 import gfmd_cli
 from gfmd_cli import compare, dataset, rows, run, solve
 from gfmd_cli.errors import InputError
+from gfmd_cli.grid import plans
 from gfmd_cli.physics.contact import Scene
 from gfmd_cli.physics.error_estimates import Verdict
 from gfmd_cli.study.signals import SIGNALS, interruptible, signal_handlers
@@ -98,6 +100,35 @@ def test_a_table_that_changes_within_a_tick_of_the_clock_is_read_again(tmp_path)
         os.utime(path, (1, 1))
         areas.append(solve(spec).a_r)
     assert areas[0] != areas[1]
+
+
+def test_every_run_that_fails_gives_its_warnings(tmp_path):
+    spec = TABLES | {"load": {"mean_gap": 1e3}}
+    shown = []
+    with warnings.catch_warnings():
+        warnings.simplefilter("default")  # once for each line of a program
+        warnings.showwarning = lambda *warning, **_: shown.append(warning)
+        for _ in range(2):
+            run(spec, tmp_path / "a.h5")
+    assert [str(message).split(":")[0] for message, *_ in shown] == 2 * [
+        "task 0 (half-space E_star=2 GPa 64 u_g=1000)",
+        str(tmp_path / "a.h5"),
+    ]
+    assert {warning[2] for warning in shown} == {__file__}
+
+
+def test_plans_are_estimated_from_the_next_call_on(monkeypatch):
+    """As a notebook asks for them that has solved the contact before."""
+    monkeypatch.delenv("GFMD_PLANS", raising=False)
+    flags, make = set(), pyfftw.FFTW
+    solve(TABLES)
+    monkeypatch.setattr(
+        pyfftw, "FFTW", lambda *a, **b: (flags.update(b["flags"]), make(*a, **b))[1]
+    )
+    monkeypatch.setenv("GFMD_PLANS", "estimated")
+    solve(TABLES)
+    assert plans.plans() == "estimated"
+    assert flags == {"FFTW_ESTIMATE"}
 
 
 def test_theory_stands_beside_a_study(tmp_path):

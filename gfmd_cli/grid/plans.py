@@ -81,7 +81,6 @@ os.register_at_fork(
     before=_planner.acquire, after_in_parent=_planner.release, after_in_child=_planner.release
 )
 """A fork waits until no thread plans: in its process the lock would never be released."""
-_always_estimated = os.environ.get("GFMD_PLANS") == "estimated"
 
 
 class _Planning(NamedTuple):
@@ -113,7 +112,7 @@ def plan_with(
     with _planner:
         _forget()
         _without_lock.clear()
-        if folder is None or _is_estimated():
+        if folder is None or are_estimated():
             return None
         with _planning_lock(folder):
             wisdom = read_wisdom(folder)
@@ -132,13 +131,14 @@ def _forget() -> None:
     _known_to = _planning.get()
 
 
-def _is_estimated() -> bool:
-    return _planning.get().estimated or _always_estimated
+def are_estimated() -> bool:
+    """Whether plans are estimated: as the run of this thread asks, or the environment."""
+    return _planning.get().estimated or os.environ.get("GFMD_PLANS") == "estimated"
 
 
 def plans() -> str:
     """How this run plans: "estimated", or "measured" with the digest of its wisdom."""
-    if _is_estimated():
+    if are_estimated():
         return "estimated"
     known = read_wisdom(_planning.get().folder or cache_folder())
     return f"measured {_digest(known) if known else ''}".strip()
@@ -151,7 +151,7 @@ def planned_transforms(make: Callable[[Planner], T], size: int = 0) -> T:
     """
     fftw = partial(pyfftw.FFTW, planning_timelimit=PLANNING_SECONDS[0] + PLANNING_SECONDS[1] * size)
     with _planner:
-        if _is_estimated():
+        if are_estimated():
             pyfftw.forget_wisdom()  # FFTW prefers to an estimate whatever it has measured
             return make(partial(fftw, flags=("FFTW_ESTIMATE",)))
         if _known_to != _planning.get():  # a run in another thread has planned since

@@ -47,7 +47,7 @@ def surface_cache(maxsize: int) -> Callable[[Function], Function]:
 
 
 def forget_files() -> None:
-    """Drop what follows from files and surfaces: these may change, and last bits with other plans."""
+    """Drop what follows from files, which may change, and from surfaces, with the present plans."""
     for cache in _caches:
         cache.cache_clear()
 
