@@ -7,12 +7,13 @@ A spec is the path of a TOML file, or its tables as a dictionary.
 
 import json
 import math
+import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
-from warnings import warn
+from warnings import warn_explicit
 
 import numpy as np
 import tabulate
@@ -184,6 +185,9 @@ def solve(spec: Path | str | Tables, *, heights: Any = None, threads: int = 1) -
             return _solve(_with_map(_without_numpy(spec), path, keys), threads)
         except InputError as error:  # the file is not the caller's
             raise InputError(str(error).replace(str(path), "heights")) from None
+        finally:  # no other call can use what is kept of this file
+            forget_files()
+            forget_scenes()
 
 
 def _with_map(tables: Tables, path: Path, keys: Tables) -> Tables:
@@ -294,8 +298,10 @@ def run(
     counts = run_study(resolved, text, path, watch, RunOptions(jobs=jobs))
     if counts.keys() - {Status.CONVERGED}:
         messages.append(f"{path}: {counted(counts)}")
-    for message in messages:
-        warn(message, stacklevel=2)
+    caller = sys._getframe(1)
+    place = caller.f_code.co_filename, caller.f_lineno, caller.f_globals.get("__name__")
+    for message in messages:  # `warn` would be silent at the same line of a second call
+        warn_explicit(message, UserWarning, *place)
     return path
 
 

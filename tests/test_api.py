@@ -1,3 +1,5 @@
+import gc
+import os
 import re
 import runpy
 import signal
@@ -11,13 +13,16 @@ from threading import Event
 
 import h5py
 import numpy as np
+import pyfftw
 import pytest
 
 import gfmd_cli
 from gfmd_cli import compare, dataset, rows, run, solve
 from gfmd_cli.errors import InputError
+from gfmd_cli.grid import plans
+from gfmd_cli.physics.contact import Scene
 from gfmd_cli.physics.error_estimates import Verdict
-from gfmd_cli.study.signals import interruptible, signal_handlers
+from gfmd_cli.study.signals import SIGNALS, interruptible, signal_handlers
 
 TABLES = {
     "surface": {"kind": "self-affine", "cutoff": 0.05, "h_std": 1e-6, "length": 1e-3},
@@ -83,6 +88,47 @@ def test_files_that_have_changed_are_read_again(tmp_path):
         assert read.a_r == pytest.approx(again.a_r, abs=1e-3)
         factors = [result.columns["short_wave_factor"] for result in (read, again)]
         assert factors[0] == pytest.approx(factors[1], rel=1e-6)
+
+
+def test_a_table_that_changes_within_a_tick_of_the_clock_is_read_again(tmp_path):
+    """Lustre, for example, has times in whole seconds."""
+    path, q = tmp_path / "table.txt", np.geomspace(0.1, 1e4, 50)
+    spec = TABLES | {"elastomer": {"kind": "table", "path": path}, "load": {"p_star": 0.1}}
+    areas = []
+    for exponent in (1.0, 2.0):
+        np.savetxt(path, np.c_[q, q**exponent])
+        os.utime(path, (1, 1))
+        areas.append(solve(spec).a_r)
+    assert areas[0] != areas[1]
+
+
+def test_every_run_that_fails_gives_its_warnings(tmp_path):
+    spec = TABLES | {"load": {"mean_gap": 1e3}}
+    shown = []
+    with warnings.catch_warnings():
+        warnings.simplefilter("default")  # once for each line of a program
+        warnings.showwarning = lambda *warning, **_: shown.append(warning)
+        for _ in range(2):
+            run(spec, tmp_path / "a.h5")
+    assert [str(message).split(":")[0] for message, *_ in shown] == 2 * [
+        "task 0 (half-space E_star=2 GPa 64 u_g=1000)",
+        str(tmp_path / "a.h5"),
+    ]
+    assert {warning[2] for warning in shown} == {__file__}
+
+
+def test_plans_are_estimated_from_the_next_call_on(monkeypatch):
+    """As a notebook asks for them that has solved the contact before."""
+    monkeypatch.delenv("GFMD_PLANS", raising=False)
+    flags, make = set(), pyfftw.FFTW
+    solve(TABLES)
+    monkeypatch.setattr(
+        pyfftw, "FFTW", lambda *a, **b: (flags.update(b["flags"]), make(*a, **b))[1]
+    )
+    monkeypatch.setenv("GFMD_PLANS", "estimated")
+    solve(TABLES)
+    assert plans.plans() == "estimated"
+    assert flags == {"FFTW_ESTIMATE"}
 
 
 def test_theory_stands_beside_a_study(tmp_path):
@@ -615,3 +661,95 @@ def test_a_forked_process_solves_with_threads_of_its_own(tmp_path):
     words = [sys.executable, "script.py"]
     completed = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert completed.stdout.splitlines() == ["True"], completed.stderr
+
+
+FORKED_WHILE_PLANNING = """
+import multiprocessing
+from threading import Event, Thread
+from gfmd_cli import solve
+from gfmd_cli.grid import plans
+
+SPEC = {
+    "surface": {"kind": "wave"},
+    "elastomer": {"kind": "half-space"},
+    "grid": {"points": 64},
+    "load": {"p_star": 0.1},
+}
+solve(SPEC)
+planning, end = Event(), Event()
+
+def plan(fftw):
+    planning.set()
+    end.wait(0.5)
+
+Thread(target=plans.planned_transforms, args=(plan,)).start()
+planning.wait()
+child = multiprocessing.get_context("fork").Process(target=lambda: print(solve(SPEC).status))
+child.start()
+child.join(60)
+child.kill()
+"""
+
+
+def test_a_process_forked_while_a_thread_plans_can_solve(tmp_path):
+    (tmp_path / "script.py").write_text(FORKED_WHILE_PLANNING)
+    words, variables = [sys.executable, "script.py"], os.environ | {"GFMD_PLANS": "estimated"}
+    completed = subprocess.run(
+        words, cwd=tmp_path, env=variables, capture_output=True, text=True, check=False
+    )
+    assert completed.stdout.splitlines() == ["converged"], completed.stderr
+
+
+def test_threads_that_read_files_keep_the_filters_of_warnings(tmp_path):
+    """Two threads that change them for a while, one after the other, can leave them changed."""
+    q = np.geomspace(0.1, 1e4, 3000)
+    heights = np.random.default_rng(0).normal(size=(40, 40))
+    heights[:, 5] = np.nan  # a line without heights
+    spec = TABLES | {"grid": {"points": 40}, "load": {"p_star": 0.1}}
+
+    def solve_one(number):
+        table, scan = tmp_path / f"{number}.txt", tmp_path / f"{number}.csv"
+        np.savetxt(table, np.c_[q, q])
+        np.savetxt(scan, heights)
+        surface = {"kind": "file", "path": scan, "length": 1.0, "missing": "fill"}
+        return solve(spec | {"surface": surface, "elastomer": {"kind": "table", "path": table}})
+
+    solve_one(0)  # imports may add filters
+    before = list(warnings.filters)
+    with ThreadPoolExecutor(4) as pool:
+        list(pool.map(solve_one, range(1, 25)))
+    assert warnings.filters == before
+
+
+def test_nothing_is_kept_that_no_other_call_can_use(tmp_path):
+    """Grids of a study have its plans, and those of an array its heights: large arrays."""
+
+    def scenes():
+        gc.collect()
+        return [each for each in gc.get_objects() if isinstance(each, Scene)]
+
+    others = scenes()
+    run(TABLES, tmp_path / "a.h5")
+    assert len(scenes()) == len(others)
+    height = np.random.default_rng(0).normal(size=(64, 64))
+    solve(TABLES | {"surface": {"length": 1.0}, "load": {"p_star": 0.1}}, heights=height)
+    assert len(scenes()) == len(others)
+
+
+def test_signals_that_a_program_blocks_stay_blocked(tmp_path):
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGUSR1])
+    try:
+        run(TABLES | {"load": {"pressure": [1e6, 2e6]}}, tmp_path / "a.h5", jobs=2)
+        assert signal.pthread_sigmask(signal.SIG_BLOCK, []) == before | {signal.SIGUSR1}
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def test_signals_of_a_program_around_python_stay_its_own(monkeypatch):
+    """Of their handlers, as R has them for SIGUSR1, Python only knows that they are not its own."""
+    known = signal.getsignal
+    monkeypatch.setattr(signal, "getsignal", lambda n: None if n == signal.SIGUSR1 else known(n))
+    before = {number: known(number) for number in SIGNALS}
+    with signal_handlers(Event(), may_exit=False):
+        changed = {number for number in SIGNALS if known(number) != before[number]}
+    assert changed == set(SIGNALS) - {signal.SIGUSR1}

@@ -1,6 +1,7 @@
 import errno
 import fcntl
 import json
+import multiprocessing
 import os
 import signal
 import socket
@@ -18,7 +19,6 @@ import pytest
 from gfmd_cli.errors import Interrupted, SpaceError
 from gfmd_cli.files import locks
 from gfmd_cli.files.locks import Waits, locked
-from gfmd_cli.grid import plans
 from gfmd_cli.study.reading import read_rows
 from gfmd_cli.study.store import Study
 
@@ -85,6 +85,18 @@ def test_a_second_process_does_not_get_a_lock_until_it_is_left(lock, kind, holde
         assert acquired
 
 
+def test_a_forked_process_does_not_keep_a_lock(lock):
+    with locked(lock):
+        child = multiprocessing.get_context("fork").Process(target=time.sleep, args=(60,))
+        child.start()
+    try:
+        with locked(lock, wait=False) as is_held:
+            assert is_held
+    finally:
+        child.kill()
+        child.join()
+
+
 def test_the_lock_of_a_killed_process_is_free(lock, kind, holder):
     process = holder(kind, "exclusive")
     process.send_signal(signal.SIGKILL)
@@ -124,7 +136,7 @@ def test_a_run_with_a_time_limit_does_not_wait_longer_for_another(
     tmp_path, monkeypatch, invoke, name
 ):
     monkeypatch.setattr(locks, "LONG_SECONDS", 0.05)
-    monkeypatch.setattr(plans, "_always_estimated", False)  # under `make test-portable` too
+    monkeypatch.delenv("GFMD_PLANS", raising=False)  # under `make test-portable` too
     monkeypatch.chdir(tmp_path)
     (tmp_path / "springs.parts").mkdir()
     limit = ("-o", "springs.h5", "--max-hours", 1e-4)
@@ -227,7 +239,7 @@ def test_a_run_without_locks_is_complete_and_leaves_no_files(tmp_path, monkeypat
     without_locks(monkeypatch, number)
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    monkeypatch.setattr(plans, "_always_estimated", False)  # under `make test-portable` too
+    monkeypatch.delenv("GFMD_PLANS", raising=False)  # under `make test-portable` too
     done = invoke("run", "spec.toml", "-j", "1", "-o", "study.h5")
     assert done.exit_code == 0, done.output
     assert [row["status"] for row in read_rows(Path("study.h5"))] == ["converged"] * 2
@@ -360,7 +372,7 @@ def test_a_lock_of_the_cache_that_nobody_frees_is_waited_for_once(tmp_path, monk
         locks.time, "sleep", lambda seconds: (waits.append(seconds), sleep(seconds))
     )
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    monkeypatch.setattr(plans, "_always_estimated", False)  # under `make test-portable` too
+    monkeypatch.delenv("GFMD_PLANS", raising=False)  # under `make test-portable` too
     monkeypatch.chdir(tmp_path)
     (tmp_path / "cache").mkdir()
     owned_elsewhere(tmp_path / "cache" / "gfmd" / "planning")

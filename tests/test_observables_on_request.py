@@ -11,7 +11,6 @@ from specs import power_spec
 
 from gfmd_cli import solve
 from gfmd_cli.errors import InputError
-from gfmd_cli.grid import plans
 from gfmd_cli.physics.elastomers import Power
 from gfmd_cli.physics.observables import LINEAR_EDGES, LOGARITHMIC_EDGES
 from gfmd_cli.physics.patches import AREA_EDGES
@@ -58,8 +57,7 @@ def study_of(output_of, folder, *overrides, text=SPEC):
 def estimated_plans():
     """The same transforms in all studies, to the last bit: a busy machine may measure others."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("GFMD_PLANS", "estimated")  # of worker processes
-        patch.setattr(plans, "_always_estimated", True)
+        patch.setenv("GFMD_PLANS", "estimated")
         yield
 
 

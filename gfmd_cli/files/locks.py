@@ -92,7 +92,10 @@ def locked(
                     raise SpaceError(f"{path}: cannot be locked: {error.strerror}") from error
             else:
                 if _is_at(file.fileno(), path):
-                    yield True
+                    try:
+                        yield True
+                    finally:
+                        fcntl.flock(file, fcntl.LOCK_UN)  # a process forked inside has it, too
                     return
                 continue
         with _owned(path.with_name(f"{path.name}.owner"), shared, wait, waits) as acquired:

@@ -21,7 +21,7 @@ from contextvars import ContextVar
 from functools import cache, partial
 from math import ceil
 from pathlib import Path
-from threading import Lock
+from threading import RLock
 from types import SimpleNamespace
 from typing import Any, NamedTuple, TypeVar
 
@@ -76,8 +76,11 @@ def _here() -> dict[str, str]:
 
 
 _without_lock: set[Path] = set()  # folders that this process could not lock
-_planner = Lock()  # FFTW does not protect its wisdom, which all threads share
-_always_estimated = os.environ.get("GFMD_PLANS") == "estimated"
+_planner = RLock()  # FFTW does not protect its wisdom, which all threads share
+os.register_at_fork(
+    before=_planner.acquire, after_in_parent=_planner.release, after_in_child=_planner.release
+)
+"""A fork waits until no thread plans: in its process the lock would never be released."""
 
 
 class _Planning(NamedTuple):
@@ -109,13 +112,13 @@ def plan_with(
     with _planner:
         _forget()
         _without_lock.clear()
-    if folder is None or _is_estimated():
-        return None
-    with _planning_lock(folder):
-        wisdom = read_wisdom(folder)
-        damaged = wisdom is None and _path(folder).exists()
-        if wisdom is None and (known := read_wisdom(cache_folder())) is not None:
-            _write(folder, known)
+        if folder is None or are_estimated():
+            return None
+        with _planning_lock(folder):
+            wisdom = read_wisdom(folder)
+            damaged = wisdom is None and _path(folder).exists()
+            if wisdom is None and (known := read_wisdom(cache_folder())) is not None:
+                _write(folder, known)
     if not damaged:
         return None
     return f"{_path(folder)}: damaged; transforms are planned anew, last bits may differ"
@@ -128,13 +131,14 @@ def _forget() -> None:
     _known_to = _planning.get()
 
 
-def _is_estimated() -> bool:
-    return _planning.get().estimated or _always_estimated
+def are_estimated() -> bool:
+    """Whether plans are estimated: as the run of this thread asks, or the environment."""
+    return _planning.get().estimated or os.environ.get("GFMD_PLANS") == "estimated"
 
 
 def plans() -> str:
     """How this run plans: "estimated", or "measured" with the digest of its wisdom."""
-    if _is_estimated():
+    if are_estimated():
         return "estimated"
     known = read_wisdom(_planning.get().folder or cache_folder())
     return f"measured {_digest(known) if known else ''}".strip()
@@ -147,7 +151,7 @@ def planned_transforms(make: Callable[[Planner], T], size: int = 0) -> T:
     """
     fftw = partial(pyfftw.FFTW, planning_timelimit=PLANNING_SECONDS[0] + PLANNING_SECONDS[1] * size)
     with _planner:
-        if _is_estimated():
+        if are_estimated():
             pyfftw.forget_wisdom()  # FFTW prefers to an estimate whatever it has measured
             return make(partial(fftw, flags=("FFTW_ESTIMATE",)))
         if _known_to != _planning.get():  # a run in another thread has planned since

@@ -3,7 +3,6 @@
 Each public function returns a warning, or "" without one.
 """
 
-import warnings
 from typing import Any
 
 import numpy as np
@@ -281,12 +280,13 @@ def shifted_lines(topography: Topography, spacing: tuple[float, ...]) -> str:
         step_y, step_x = (1 + points // (4 * FORM_POINTS) for points in lines.shape)
         halves = np.array_split(np.diff(lines[:, ::step_x], axis=0), 2, axis=1)
         known = np.array([np.isfinite(half).sum(axis=1) for half in halves])
-        with warnings.catch_warnings(action="ignore", category=RuntimeWarning):  # all are missing
-            inside = float(np.nanstd(lines[::step_y, lag:] - lines[::step_y, :-lag]))
-            medians = np.array([np.nanmedian(half, axis=1) for half in halves])
-        medians = medians[:, (known >= MIN_KNOWN).all(axis=0)]
-        if medians.shape[1] < MIN_LINES // 2 or not inside > 0:
+        is_known = (known >= MIN_KNOWN).all(axis=0)
+        differences = lines[::step_y, lag:] - lines[::step_y, :-lag]
+        differences = differences[np.isfinite(differences)]
+        inside = float(differences.std()) if differences.size else 0.0
+        if np.count_nonzero(is_known) < MIN_LINES // 2 or not inside > 0:
             continue
+        medians = np.array([np.nanmedian(half[is_known], axis=1) for half in halves])
         medians -= np.median(medians, axis=1, keepdims=True)
         shifts = np.where(medians.prod(axis=0) > 0, np.abs(medians).min(axis=0), 0.0)
         shifts *= np.sign(medians[0])

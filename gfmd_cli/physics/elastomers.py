@@ -9,7 +9,6 @@ from functools import lru_cache
 from math import ceil
 from pathlib import Path
 from typing import Annotated, ClassVar, Literal, Self
-from warnings import catch_warnings
 
 import numpy as np
 from pydantic import Field as Key
@@ -23,6 +22,7 @@ from gfmd_cli.maps.interpolation import monotone_cubic
 from gfmd_cli.physics.compliance_transforms import Compliance, separated
 from gfmd_cli.physics.contact import Scene
 from gfmd_cli.physics.free_compliance import Spacings
+from gfmd_cli.physics.indenters import surface_cache
 from gfmd_cli.physics.linear_elastomer import LinearElastomer
 from gfmd_cli.physics.persson import gamma_slab
 from gfmd_cli.spec_table import FilePath, Positive
@@ -379,14 +379,14 @@ def _read_table(path: Path) -> Field:
         ) from error
 
 
-@lru_cache(maxsize=4)
+@surface_cache(maxsize=4)
 def _table(path: Path, version: Version) -> Field:
     """The columns of a table in this version; cached, because every block of rows asks for k."""
     if path.stat().st_size > MAX_TABLE_BYTES or not path.is_file():
         raise ValueError(f"not a regular file of at most {MAX_TABLE_BYTES} bytes")
     lines = path.read_text("utf-8-sig").translate(SEPARATORS).splitlines()
-    with catch_warnings(action="ignore", category=UserWarning):
-        table = np.loadtxt(lines, ndmin=2)  # warns of an empty file, refused below
+    is_empty = not any(line.partition("#")[0].strip() for line in lines)
+    table = np.empty((0, 0)) if is_empty else np.loadtxt(lines, ndmin=2)
     if table.shape[0] < 2 or table.shape[1] != 2:
         raise InputError(
             f"{path}: elastomer.path: {table.shape[0]} rows, {table.shape[1]} columns; "

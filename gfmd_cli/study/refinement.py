@@ -12,6 +12,7 @@ import numpy as np
 from gfmd_cli.errors import InputError
 from gfmd_cli.grid.arrays import Field, row_blocks
 from gfmd_cli.grid.fft_grid import Shape
+from gfmd_cli.grid.plans import are_estimated
 from gfmd_cli.grid.ranks import on_root
 from gfmd_cli.physics import discretisation_error
 from gfmd_cli.physics.contact import Contact, Scene
@@ -68,7 +69,7 @@ class TaskSolution:
 
 
 @lru_cache(maxsize=1)
-def _scenes(thread: int, *description: Any) -> dict[Shape, Scene]:
+def _scenes(thread: int, estimated: bool, *description: Any) -> dict[Shape, Scene]:
     """The scenes of one surface and elastomer by shape of the grid, see `task_scene`.
 
     They are kept for one thread only: the transforms of a scene work in one memory.
@@ -83,7 +84,8 @@ def task_scene(task: Task, points: int, context: SolveContext) -> Scene:
     are kept: together with a solve they take less memory than a solve on their grid.
     """
     shared = context.options.threads, context.ranks
-    scenes = _scenes(get_ident(), task.boundary, task.surface, task.elastomer, *shared)
+    of = get_ident(), are_estimated()
+    scenes = _scenes(*of, task.boundary, task.surface, task.elastomer, *shared)
     shape = task.points_y_on(points), points
     for other in set(scenes) - {shape}:
         if prod(other) < 4 * prod(shape):

@@ -124,6 +124,7 @@ def run_study(
     context = SolveContext(worker_options, watch, stop, ranks)
     with signal_handlers(stop, may_exit=options.may_exit), ExitStack() as work:
         damaged = on_root(ranks, lambda: work.enter_context(study.work(tasks)))
+        work.callback(forget_scenes)  # their plans are those of this run
         work.callback(plans.plan_with, None)
         unusable = plans.plan_with(study.parts, estimated=options.reproducible, waits=waits)
         context.warn(*(f"{study.path}: the old one is kept as {new}" for new in moved))

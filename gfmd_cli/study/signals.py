@@ -19,8 +19,12 @@ SIGNALS = (
 
 
 def _handled_signals() -> list[signal.Signals]:
-    """The signals that this process was not started to ignore, as under nohup."""
-    return [number for number in SIGNALS if signal.getsignal(number) is not signal.SIG_IGN]
+    """The signals that this process was not started to ignore, as under nohup.
+
+    Nor those that a program takes in which Python is embedded: their handlers cannot be restored.
+    """
+    others = (signal.SIG_IGN, None)
+    return [number for number in SIGNALS if signal.getsignal(number) not in others]
 
 
 _interruptible = False  # whether the main thread may be interrupted now
@@ -71,11 +75,11 @@ def signal_handlers(stop: Event, *, may_exit: bool) -> Iterator[None]:
 @contextmanager
 def blocked_signals() -> Iterator[None]:
     """Inside, signals wait; a process that is started inside begins with its signals blocked."""
-    signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
     try:
         yield
     finally:
-        signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def handle_signals_in_worker(stop: Event) -> None:
