@@ -70,7 +70,7 @@ NOVA = re.compile(rb"^[ \t]*(Scale Data|Unit X|Unit Y)[ \t]*=[ \t]*(\S+)", re.MU
 MANY_VALUES = 8  # in a row, for which rounding may make the steps uneven; a choice
 MAX_UNEVENNESS = 0.25  # of rounded positions, over their distance; a choice
 MAX_OFF_SQUARE = 0.02  # octaves by which pixels differ from square or 2:1, 4:1, ...; a choice
-_ignores_warnings = Lock()
+_filter_lock = Lock()
 """One thread at a time: with two, the filters of warnings of the process could stay changed."""
 
 
@@ -78,7 +78,7 @@ def read_microscope_file(path: Path, dataset: str | None) -> HeightMap:
     """Read a microscope file by SurfaceTopography."""
     if path.stat().st_size > MAX_MAP_BYTES:
         raise InputError(f"{path.stat().st_size} bytes; at most {MAX_MAP_BYTES} are read")
-    with path.open("rb") as file, _ignores_warnings, warnings.catch_warnings():
+    with path.open("rb") as file, _filter_lock, warnings.catch_warnings():
         ignored = (DeprecationWarning, FutureWarning, ImportWarning, RuntimeWarning)
         for category in ignored:  # of other packages
             warnings.simplefilter("ignore", category)
