@@ -193,7 +193,7 @@ def _fit_lines(nearest: SelfAffineFit, metres: str) -> list[str]:
     """The fit with warnings."""
     wavelength, error = nearest.rolloff_wavelength, nearest.rolloff_error
     rolloff = "no roll-off within the cell"
-    if wavelength is not None:
+    if wavelength is not None and error is not None:
         rolloff = f"lambda_r = {plus_minus(wavelength, error)}{metres}"
     lines = [
         f"fitted spectrum: H = {plus_minus(nearest.hurst, nearest.hurst_error)}, {rolloff}, "

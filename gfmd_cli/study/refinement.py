@@ -84,8 +84,8 @@ def task_scene(task: Task, points: int, context: SolveContext) -> Scene:
     are kept: together with a solve they take less memory than a solve on their grid.
     """
     shared = context.options.threads, context.ranks
-    of = get_ident(), are_estimated()
-    scenes = _scenes(*of, task.boundary, task.surface, task.elastomer, *shared)
+    here = get_ident(), are_estimated()
+    scenes = _scenes(*here, task.boundary, task.surface, task.elastomer, *shared)
     shape = task.points_y_on(points), points
     for other in set(scenes) - {shape}:
         if prod(other) < 4 * prod(shape):
