@@ -290,3 +290,10 @@ def test_a_fit_with_longer_waves_than_the_side_along_x_suggests_no_surface(outpu
     text = output_of("surface", tmp_path / "spec.toml")
     assert "lambda_s is larger than the side along x, and no random surface is suggested" in text
     assert "[surface]" not in text
+
+
+def test_a_hurst_exponent_that_is_rounded_to_zero_has_no_sign(output_of, tmp_path):
+    keys = "cutoff = 0.0625\nhurst = 0.001\nrolloff = 10.0\nlength_y = 0.20845675700401464"
+    text = OBLONG.replace("cutoff = 0.1", f"{keys}\nseed = 951769")
+    (tmp_path / "spec.toml").write_text(text.replace("[48, 40]", "64").replace("points_y = 72", ""))
+    assert "H = 0.000 +-" in output_of("surface", tmp_path / "spec.toml")

@@ -207,7 +207,7 @@ def _fit_lines(nearest: SelfAffineFit, length: float, metres: str) -> list[str]:
     if wavelength is not None:
         rolloff = f"lambda_r = {wavelength:.3g} +- {error:.2g}{metres}"
     lines = [
-        f"fitted spectrum: H = {nearest.hurst:.3f} +- {nearest.hurst_error:.3f}, {rolloff}, "
+        f"fitted spectrum: H = {nearest.hurst:z.3f} +- {nearest.hurst_error:.3f}, {rolloff}, "
         f"lambda_s = {nearest.cutoff_wavelength:.3g}{metres}, rms height "
         f"{nearest.rms_height:.4g}{metres} (scatter {nearest.scatter:.3g})"
     ]
