@@ -282,3 +282,11 @@ def test_the_summary_is_that_of_the_surface_of_the_study(output_of, tmp_path):
     assert summary["points"] == [48, 72]
     assert summary["Sq"] == pytest.approx(heights.std(), rel=1e-9)
     assert summary["Sz"] == pytest.approx(np.ptp(heights), rel=1e-9)
+
+
+def test_a_fit_with_longer_waves_than_the_side_along_x_suggests_no_surface(output_of, tmp_path):
+    cone = OBLONG.replace('kind = "self-affine"\ncutoff = 0.1', 'kind = "cone"\nlength_y = 3.25')
+    (tmp_path / "spec.toml").write_text(cone.replace("[48, 40]", "64").replace("72", "13"))
+    text = output_of("surface", tmp_path / "spec.toml")
+    assert "lambda_s is larger than the side along x, and no random surface is suggested" in text
+    assert "[surface]" not in text

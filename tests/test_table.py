@@ -127,6 +127,7 @@ def test_json_has_none_for_what_does_not_apply():
         (12345.6, 150.0, "12346 +- 150"),
         (1234567.0, 1500.0, "1.2346e+06 +- 1.5e+03"),
         (0.3, 2e7, "0 +- 2.0e+07"),
+        (-0.0004, 0.02, "0.000 +- 0.020"),
     ],
 )
 def test_errors_of_any_size_can_be_printed(value, error, text):

@@ -115,6 +115,18 @@ def test_the_deviation_over_the_highest_points_is_that_of_a_sort():
         assert deviation == pytest.approx(stress[:count].std(), rel=1e-9)
 
 
+def test_rounding_does_not_part_equal_heights():
+    grid = Grid(32)
+    levels = np.random.default_rng(0).integers(4, size=grid.shape) / 3  # on the edges of bins
+    noise = 1e-15 * np.random.default_rng(1).standard_normal(grid.shape)
+    exact, rounded = (
+        bearing(Contact(grid, height, grid.wavenumber(), 1.0))
+        for height in (levels, levels + noise)
+    )
+    assert exact.area.tolist() == [np.mean(levels > level) for level in (0.9, 0.5, 0.2)]
+    assert rounded.area.tolist() == exact.area.tolist()
+
+
 def test_springs_on_a_paraboloid_carry_what_the_closed_form_says():
     """Exactly p = k a_r^2 / (4 pi R); over the disc s has k a^2 / (2 R sqrt(12)).
 

@@ -161,14 +161,16 @@ def summary_text(summary: SurfaceSummary) -> str:
     nearest = summary.spectrum.fit
     theories = {"spectrum": summary.scene}
     random: list[str] = []
-    if nearest is not None and nearest.scatter <= MAX_SCATTER:
+    if nearest is not None and not _reason_against(nearest, grid.length):
         table = _table(nearest, grid.length)
         model = SelfAffine.model_validate(table)
         theories["fit"] = build_scene(model, HalfSpace(), first_grid(model))
         random = ["random surface with the fitted spectrum:", "", "[surface]"]
         random += [f"{key} = {json.dumps(value)}" for key, value in table.items()]
     if grid.dimension == 2:
-        fitted = _fit_lines(nearest, metres) if nearest else [f"no fit: {summary.spectrum.no_fit}"]
+        fitted = [f"no fit: {summary.spectrum.no_fit}"]
+        if nearest is not None:
+            fitted = _fit_lines(nearest, grid.length, metres)
         lines += [*fitted, *_predicted(theories, metres), *random]
     title = summary.surface.preparation() or summary.surface.label
     return "\n".join([title, *(f"  {line}".rstrip() for line in lines)])
@@ -189,7 +191,16 @@ def _predicted(scenes: dict[str, Scene], metres: str) -> list[str]:
     return table.as_text().splitlines()
 
 
-def _fit_lines(nearest: SelfAffineFit, metres: str) -> list[str]:
+def _reason_against(nearest: SelfAffineFit, length: float) -> str:
+    """Why no random surface on a cell of side `length` [m] is suggested; empty where one is."""
+    if nearest.scatter > MAX_SCATTER:
+        return "The scatter is far above 1: the surface is not self-affine"
+    if nearest.cutoff_wavelength > length:
+        return "lambda_s is larger than the side along x"
+    return ""
+
+
+def _fit_lines(nearest: SelfAffineFit, length: float, metres: str) -> list[str]:
     """The fit with warnings."""
     wavelength, error = nearest.rolloff_wavelength, nearest.rolloff_error
     rolloff = "no roll-off within the cell"
@@ -206,11 +217,8 @@ def _fit_lines(nearest: SelfAffineFit, metres: str) -> list[str]:
             f"{nearest.hurst_of_long_waves:.2g}; the error of H contains the difference. Check the "
             "map for noise, blur or a filter"
         )
-    if nearest.scatter > MAX_SCATTER:
-        lines.append(
-            "The scatter is far above 1: the surface is not self-affine, and no random surface is "
-            "suggested."
-        )
+    if reason := _reason_against(nearest, length):
+        lines.append(f"{reason}, and no random surface is suggested.")
     elif not MIN_HURST <= round(nearest.hurst, 2) <= 1:  # as shown
         lines.append(
             f"The fit gives H = {nearest.hurst:.2g}, which is outside {MIN_HURST:g} to 1. The "

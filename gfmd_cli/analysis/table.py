@@ -190,7 +190,7 @@ def plus_minus(value: float, error: float) -> str:
     least, largest = DECIMAL
     if value == 0 or least <= abs(value) < largest:
         digits = min(max(digits, 0), 12)
-        return f"{value:.{digits}f} +- {_decimal(error, digits)}"
+        return f"{value:z.{digits}f} +- {_decimal(error, digits)}"
     digits += math.floor(math.log10(abs(value)))
     return f"{value:.{min(max(digits, 0), 12)}e} +- {error:.1e}"
 

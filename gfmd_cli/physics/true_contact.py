@@ -20,6 +20,9 @@ from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.physics.contact import Contact
 
 HEIGHT_BINS = 1 << 14  # of height, of width 1e-3 h_std or less for heights within +-8 h_std
+BIN_ROUNDING = 1e-6
+"""Of a bin, by which equal heights may differ by rounding, so that one bin has them all; a choice.
+At a depth of all bins, rounding is 1e-12 of them."""
 MIN_POINTS = 10  # for a standard deviation; a choice
 ROUNDING = 1e-10  # Delta_sigma; a smaller deviation of sigma_h is rounding
 
@@ -108,7 +111,7 @@ def bearing(contact: Contact) -> Bearing:
     low, high = float(height.min()), float(height.max())
     sums = np.zeros((3, HEIGHT_BINS))
     for rows in row_blocks(height):
-        depth = (high - height[rows]) * ((HEIGHT_BINS - 1) / (high - low))
+        depth = (high - height[rows]) * ((HEIGHT_BINS - 1) / (high - low)) + BIN_ROUNDING
         bin_number, values = depth.astype(np.int64).ravel(), stress[rows].ravel()
         for total, weight in zip(sums, (np.ones_like(values), values, values**2), strict=True):
             total += np.bincount(bin_number, weight, minlength=HEIGHT_BINS)
