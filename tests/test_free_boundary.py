@@ -372,3 +372,35 @@ def test_true_contact_is_measured_with_a_free_boundary(rows_of):
     assert 0 < row["deviation_c"] < 1
     assert 0 < row["quadrature_c"] < 2
     assert row["deviation_bearing"] > 0
+
+
+def test_an_array_ends_at_its_borders_also_if_the_spec_says_so():
+    heights = np.cumsum(np.random.default_rng(0).normal(size=(8, 9)), 0)
+    spec = {
+        "elastomer": {"kind": "half-space"},
+        "grid": {"boundary": "free", "points": 18},
+        "load": {"p_star": 0.05},
+    }
+    by_default, stated = (
+        api.solve(spec | {"surface": {"length": 1.0} | edges}, heights=heights)
+        for edges in ({}, {"edges": "none"})
+    )
+    assert by_default.columns["periodic"] == stated.columns["periodic"] == 0
+    np.testing.assert_array_equal(stated.height, by_default.height)
+    assert stated.columns["displacement"] == by_default.columns["displacement"]
+
+
+@pytest.mark.parametrize("boundary", ["free", "periodic"])
+def test_few_points_in_contact_have_no_standard_deviation(boundary):
+    heights = -1 + 0.01 * np.random.default_rng(0).normal(size=(9, 12))
+    heights[4, 3] = heights[4, 8] = heights[2, 5] = 1.0
+    spec = {
+        "surface": {"length": 1.0, "level": "none", "interpolation": "monotone"},
+        "elastomer": {"kind": "half-space"},
+        "grid": {"boundary": boundary},
+        "load": {"p_star": 1e-3},
+        "output": {"true_contact": True},
+    }
+    result = api.solve(spec, heights=heights)
+    assert 0 < result.contact.sum() < 10
+    assert np.isnan(result.columns["deviation_c"])

@@ -131,6 +131,22 @@ def test_a_hole_in_a_harmonic_surface_is_filled_exactly():
         np.testing.assert_allclose(fill_missing(holed, missing), exact, atol=1e-10, rtol=0)
 
 
+@pytest.mark.parametrize("largest", [10, 10**6])
+def test_a_hole_in_a_harmonic_surface_is_filled_on_oblong_pixels(monkeypatch, largest):
+    monkeypatch.setattr(map_preparation, "MAX_EXACT", largest)
+    spacing = (0.1, 0.25)
+    y, x = np.meshgrid(*(step * np.arange(24) for step in spacing), indexing="ij")
+    for exact in (x * y, x**2 - y**2, 3 + x - 2 * y):
+        missing = np.zeros(exact.shape, dtype=bool)
+        missing[5:12, 3:15] = missing[16, 16] = True
+        tolerance = 1e-10 if largest > missing.sum() else 0.03 * np.ptp(exact)
+        holed = np.where(missing, np.nan, exact)
+        filled = fill_missing(holed, missing, spacing=spacing)
+        np.testing.assert_allclose(filled, exact, atol=tolerance, rtol=0)
+        metres = fill_missing(holed, missing, spacing=(1e-7, 2.5e-7))
+        np.testing.assert_allclose(metres, filled, atol=1e-12, rtol=0)
+
+
 def test_a_filled_hole_lies_between_its_rim(heights):
     """The maximum principle, at the border of the map, too."""
     missing = np.random.default_rng(3).random(heights.shape) < 0.15

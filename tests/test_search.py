@@ -358,7 +358,7 @@ def test_a_load_in_a_jump_of_the_area_is_warned_of(gfmd):
     for area, warned in ((0.5, 0), (0.7, 1)):
         done = gfmd(*words, "-o", f"{area}.h5", "--set", f"load={{contact_area={area}}}")
         assert done.exit_code == 0
-        warning = f"load.contact_area = {area} lies in a jump; this is the nearest contact"
+        warning = f"load.contact_area = {area} lies in a jump; this is the nearest contact found"
         (row,) = read_rows(Path(f"{area}.h5"))
         for text in (done.output, row["warnings"], gfmd("analyze", f"{area}.h5").output):
             assert text.count(warning) == warned

@@ -105,12 +105,18 @@ def window(shape: tuple[int, ...], taper: float, finer: tuple[int, ...] | None =
     return weight
 
 
-def fill_missing(heights: Field, missing: Mask, *, periodic: bool = False) -> Field:
+def fill_missing(
+    heights: Field,
+    missing: Mask,
+    *,
+    spacing: tuple[float, ...] = (1.0, 1.0),
+    periodic: bool = False,
+) -> Field:
     """Fill missing heights in by the solution of the discrete Laplace equation.
 
     Each missing height is the mean of its neighbours (fewer than four at the edge of the map,
-    unless it is periodic), so that the filling has no maximum or minimum of its own. Known heights
-    are the boundary values.
+    unless it is periodic) with weights 1/distance^2, so that the filling has no maximum or minimum
+    of its own. Known heights are the boundary values.
     Beyond `MAX_EXACT` missing heights, `JACOBI_STEPS` steps of the Jacobi iteration smooth the
     solution of a map of half the resolution, without solving the equation exactly.
 
@@ -118,6 +124,7 @@ def fill_missing(heights: Field, missing: Mask, *, periodic: bool = False) -> Fi
     ----------
     heights : shape (rows, columns) or (points,), any value where missing
     missing : mask of the missing heights, of the same shape; at least one height is known
+    spacing : distance of the points along each axis, in any unit
     periodic : whether points at opposite edges are neighbours
     """
     known = np.atleast_2d(np.where(missing, 0.0, heights))
@@ -125,25 +132,33 @@ def fill_missing(heights: Field, missing: Mask, *, periodic: bool = False) -> Fi
     if not holes.any():
         return known.reshape(heights.shape)
     exact = np.count_nonzero(holes) <= MAX_EXACT
-    filled = (_harmonic if exact else _smooth)(known, holes, periodic)
-    return filled.reshape(heights.shape)
+    weights = np.resize(min(spacing) / np.array(spacing), 2) ** 2  # of the axes of `known`
+    filled = (_harmonic if exact else _smooth)(known, holes, weights, periodic)
+    low = known.min(where=~holes, initial=np.inf)
+    high = known.max(where=~holes, initial=-np.inf)
+    return np.clip(filled, low, high, out=filled).reshape(heights.shape)  # less the rounding
 
 
-def _smooth(known: Field, missing: Mask, periodic: bool) -> Field:
+def _smooth(known: Field, missing: Mask, weights: Field, periodic: bool) -> Field:
     """Filling from a map of half the resolution; `known` is zero where missing."""
     count, total = block_sums((~missing).astype(np.float64), 2), block_sums(known, 2)
-    coarse = fill_missing(total / np.maximum(count, 1.0), count == 0, periodic=periodic)
+    spacing = tuple(weights**-0.5)
+    coarse = fill_missing(
+        total / np.maximum(count, 1.0), count == 0, spacing=spacing, periodic=periodic
+    )
     for axis in (0, 1):
         coarse = coarse.repeat(2, axis)
     filled = np.where(missing, coarse[: known.shape[0], : known.shape[1]], known)
     for _ in range(JACOBI_STEPS):
         around = np.pad(filled, 1, mode="wrap" if periodic else "edge")
-        mean = around[:-2, 1:-1] + around[2:, 1:-1] + around[1:-1, :-2] + around[1:-1, 2:]
-        np.copyto(filled, 0.25 * mean, where=missing)
+        along_y = around[:-2, 1:-1] + around[2:, 1:-1]
+        along_x = around[1:-1, :-2] + around[1:-1, 2:]
+        mean = (weights[0] * along_y + weights[1] * along_x) / (2 * weights.sum())
+        np.copyto(filled, mean, where=missing)
     return filled
 
 
-def _harmonic(known: Field, missing: Mask, periodic: bool) -> Field:
+def _harmonic(known: Field, missing: Mask, weights: Field, periodic: bool) -> Field:
     """Filling by the sparse linear system; `known` is zero where missing."""
     from scipy.sparse import coo_array  # a tenth of a second that most processes save
     from scipy.sparse.linalg import spsolve
@@ -151,20 +166,22 @@ def _harmonic(known: Field, missing: Mask, periodic: bool) -> Field:
     points = np.argwhere(missing)
     number = np.full(missing.shape, -1)
     number[missing] = diagonal = np.arange(len(points))
-    counts, right = np.zeros((2, len(points)))
+    totals, right = np.zeros((2, len(points)))
     pairs = []
     for step in ((1, 0), (-1, 0), (0, 1), (0, -1)):
+        weight = weights[np.flatnonzero(step)[0]]
         neighbours = (points + step) % missing.shape if periodic else points + step
         inside = np.flatnonzero(np.all((neighbours >= 0) & (neighbours < missing.shape), axis=1))
         indices = tuple(neighbours[inside].T)
-        counts[inside] += 1.0
-        right[inside] += known[indices]
+        totals[inside] += weight
+        right[inside] += weight * known[indices]
         is_missing = missing[indices]
-        pairs.append((inside[is_missing], number[indices][is_missing]))
-    row, column = np.hstack(pairs)
+        row, column = inside[is_missing], number[indices][is_missing]
+        pairs.append((row, column, np.full(row.size, -weight)))
+    row, column, values = (np.concatenate(parts) for parts in zip(*pairs, strict=True))
     matrix = coo_array(
         (
-            np.concatenate([counts, -np.ones(row.size)]),
+            np.concatenate([totals, values]),
             (np.concatenate([diagonal, row]), np.concatenate([diagonal, column])),
         )
     )

@@ -267,7 +267,8 @@ class FileSurface(RigidSurface):
             )
         if self.has_borders:
             return self.model_copy(update={"edges": "none" if boundary == "free" else "mirror"})
-        if boundary == "periodic" or self.edges or self._stated_periodic() is not None:
+        is_made_periodic = self.edges not in (None, "none")
+        if boundary == "periodic" or is_made_periodic or self._stated_periodic() is not None:
             return self
         array = {"periodic": False, "level": self.levelling(), "edges": "none"}
         return self.model_copy(update=array)
@@ -528,7 +529,8 @@ def _filled(surface: FileSurface) -> Field:
             f"{', '.join(f'{axis} = {index}' for axis, index in first)}; "
             'surface.missing = "fill" fills them in, "void" keeps them out of contact'
         )
-    return fill_missing(heights, missing, periodic=surface._is_repeated())
+    spacing, periodic = surface._map_spacing(), surface._is_repeated()
+    return fill_missing(heights, missing, spacing=spacing, periodic=periodic)
 
 
 @surface_cache(maxsize=16)

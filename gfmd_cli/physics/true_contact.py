@@ -37,13 +37,19 @@ class ContactStress:
     """Root mean square of its quadrature; NaN without contact."""
 
 
-def contact_stress(contact: Contact, touching: Mask) -> ContactStress:
-    """Compute both moments over the points in contact; `touching` has the shape `grid.shape`."""
+def contact_stress(contact: Contact, touching: Mask, copies: int = 1) -> ContactStress:
+    """Compute both moments over the points in contact.
+
+    Parameters
+    ----------
+    touching : points in contact, shape `grid.shape`
+    copies : of each point of the map in a mirrored contact; for `MIN_POINTS` they count once
+    """
     if not np.any(touching):
         return ContactStress(np.nan, np.nan)
     grid, square = contact.grid, 0.0
     field = contact.elasticity(contact.height, grid.empty())
-    known = np.count_nonzero(touching) >= MIN_POINTS
+    known = np.count_nonzero(touching) >= MIN_POINTS * copies
     deviation = float(field[touching].std()) if known else np.nan
     for axis in range(grid.dimension):  # the components of the quadrature
         modes = grid.forward_into_work(contact.height)

@@ -48,7 +48,7 @@ class SolvedContact:
     def full_contact_stress(self) -> ContactStress:
         """Statistics of the full-contact stress over the points in contact."""
         touching = self.touching if self.contact.is_periodic else mirror(self.touching)
-        return contact_stress(self.mirrored, touching)
+        return contact_stress(self.mirrored, touching, touching.size // self.touching.size)
 
     @cached_property
     def percolates(self) -> list[bool]:

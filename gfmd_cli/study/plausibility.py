@@ -201,7 +201,8 @@ def _load_in_jump(task: Task, status: Status, results: Mapping[str, Any]) -> Ite
     if task.quantity == "contact_area" and status.is_accurate:
         value = loaded_value(task.quantity, results)
         if not abs(value - task.load) <= task.load_tolerance * task.load:
-            yield f"load.contact_area = {task.load:g} lies in a jump; this is the nearest contact"
+            load = f"load.contact_area = {task.load:g}"
+            yield f"{load} lies in a jump; this is the nearest contact found"
 
 
 def _missed_accuracy(task: Task, solved: TaskSolution) -> Iterator[str]:
