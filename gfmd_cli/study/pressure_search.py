@@ -103,15 +103,12 @@ class PressureSearch:
         return abs(one.trial.value - other.trial.value) <= 0.5 * self.quantum
 
     @property
-    def root(self) -> float:
-        """Estimate of ln p at the load: a secant step from the nearest trial, in the enclosure."""
+    def result(self) -> float:
+        """ln p of the root, a secant step away from the nearest trial; of that without success."""
+        if not self.succeeded:
+            return log(self.nearest.pressure)
         low, high = self._enclosure()
         return min(max(low.x, self._secant(self.points[0])), high.x)
-
-    @property
-    def result(self) -> float:
-        """ln p of the root; of the nearest trial where the search has not succeeded."""
-        return self.root if self.succeeded else log(self.nearest.pressure)
 
     def _secant(self, start: _Point, least: float = 0.0) -> float:
         """ln p after a secant step from a trial, at least `least` and at most MAX_STEP long."""
