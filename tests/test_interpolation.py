@@ -4,13 +4,7 @@ import numpy as np
 import pytest
 
 from gfmd_cli import solve
-from gfmd_cli.maps.interpolation import (
-    _jumps,
-    _short_waves,
-    _ties,
-    monotone,
-    suited_interpolation,
-)
+from gfmd_cli.maps.interpolation import _jumps, _short_waves, _ties, monotone, suited_interpolation
 from gfmd_cli.physics.file_surface import FileSurface
 from gfmd_cli.physics.self_affine import SelfAffine
 

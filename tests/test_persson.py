@@ -9,14 +9,7 @@ from scipy.special import exp1
 from gfmd_cli.physics import persson
 from gfmd_cli.physics.elastomers import Slab
 from gfmd_cli.physics.gap_theories import FittedWeight
-from gfmd_cli.physics.persson import (
-    Persson,
-    Shells,
-    gamma_n,
-    gamma_slab,
-    ierfc,
-    shells,
-)
+from gfmd_cli.physics.persson import Persson, Shells, gamma_n, gamma_slab, ierfc, shells
 
 P_STAR = np.array([0.001, 0.01, 0.1, 0.3, 1, 2, 3])
 # default surface: Delta_sigma / (k_n h_std), then u_g / h_std at P_STAR, as rounded in the table

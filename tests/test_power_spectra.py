@@ -6,11 +6,7 @@ import pytest
 from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.maps.roughness_parameters import autocorrelation
 from gfmd_cli.physics.elastomers import Power
-from gfmd_cli.physics.power_spectra import (
-    autocorrelations,
-    correlation,
-    spectra,
-)
+from gfmd_cli.physics.power_spectra import autocorrelations, correlation, spectra
 from gfmd_cli.physics.scenes import build_scene
 from gfmd_cli.physics.self_affine import SelfAffine
 

@@ -9,14 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from gfmd_cli.cli.messages import print_error, print_text
-from gfmd_cli.cli.options import (
-    FILE,
-    Command,
-    Number,
-    output_option,
-    overrides_option,
-    study_path,
-)
+from gfmd_cli.cli.options import FILE, Command, Number, output_option, overrides_option, study_path
 from gfmd_cli.cli.progress import Reporter
 from gfmd_cli.errors import InputError, typed
 from gfmd_cli.status import Status, counted

@@ -44,12 +44,7 @@ from gfmd_cli.maps.noise import noise_beyond, noisy
 from gfmd_cli.maps.pictures import Picture, picture
 from gfmd_cli.maps.tip import blunted
 from gfmd_cli.maps.topography import Region, Topography, read_topography
-from gfmd_cli.physics.indenters import (
-    POINTS_ROUNDING,
-    SMALLEST_GRID,
-    RigidSurface,
-    surface_cache,
-)
+from gfmd_cli.physics.indenters import POINTS_ROUNDING, SMALLEST_GRID, RigidSurface, surface_cache
 from gfmd_cli.spec_table import FilePath, Positive
 from gfmd_cli.units import count, labelled
 

@@ -35,12 +35,7 @@ from gfmd_cli.study.measure import measured
 from gfmd_cli.study.notes import Trial
 from gfmd_cli.study.plausibility import loaded_value
 from gfmd_cli.study.pressure_search import MIN_SLOPE, PressureSearch
-from gfmd_cli.study.refinement import (
-    TaskSolution,
-    has_coarser_grid,
-    solve_on_grids,
-    task_scene,
-)
+from gfmd_cli.study.refinement import TaskSolution, has_coarser_grid, solve_on_grids, task_scene
 from gfmd_cli.study.tasks import Task
 
 # Choices, which change the number of trials (one to three on a grid) and hardly the result:
