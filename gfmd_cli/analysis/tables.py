@@ -218,12 +218,9 @@ def comparison_table(curves: TitledCurves) -> Table:
 
 def border_note(curves: TitledCurves) -> str:
     """A sentence on what the theory leaves out of contacts with a free boundary; else ""."""
-    is_free = any(row["boundary"] == "free" for _, curve in curves for row in curve.rows)
-    return (
-        " It is that of a periodic surface, without the borders of a free boundary."
-        if is_free
-        else ""
-    )
+    if all(row["boundary"] != "free" for _, curve in curves for row in curve.rows):
+        return ""
+    return " It is that of a periodic surface, without the borders of a free boundary."
 
 
 def over_pressure(
