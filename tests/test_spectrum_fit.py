@@ -1,3 +1,5 @@
+import tomllib
+
 import numpy as np
 import pytest
 from scipy.ndimage import grey_dilation
@@ -138,13 +140,13 @@ def test_the_fit_has_the_gradient_of_a_surface_whose_spectrum_fills_the_grid(hur
     assert gradient == pytest.approx(expected, rel=0.01)
 
 
-def fit_of_map(heights, tmp_path, pixel=1e-6):
-    """The summary of a map with borders and an rms height of 0.1 um."""
+def fit_of_map(heights, tmp_path, pixel=1e-6, *, periodic=False):
+    """The summary of a map, by default with borders, and an rms height of 0.1 um."""
     heights = 1e-7 * heights / heights.std()
     np.save(tmp_path / "map.npy", heights)
     forget_files()
     side = pixel * heights.shape[1]
-    return summarise(FileSurface(path=tmp_path / "map.npy", periodic=False, length=side))
+    return summarise(FileSurface(path=tmp_path / "map.npy", periodic=periodic, length=side))
 
 
 def part_of_roughness(seed, rolloff=2.0, hurst=0.8):
@@ -156,6 +158,39 @@ def with_noise(heights, share, seed=11):
     """White noise of a share of the rms difference of neighbours."""
     noise = np.random.default_rng(seed).standard_normal(heights.shape)
     return heights + share * np.diff(heights).std() * noise
+
+
+def suggested(summary):
+    """The random surface at the end of the summary."""
+    table = tomllib.loads(summary_text(summary).partition("fitted spectrum:\n")[2])["surface"]
+    return SelfAffine.model_validate(table)
+
+
+@pytest.mark.parametrize("rolloff", [2.0, 0.5])
+@pytest.mark.parametrize("seed", range(2))
+def test_the_random_surface_of_a_mirrored_map_has_the_density_of_the_fit(seed, rolloff, tmp_path):
+    """Its cell has four times the area, and waves of up to twice the length of those of the map.
+
+    By Eqs. (3) and (40) |h(q)|^2 times the area is that of the fit: C(q) 256^2 on the map.
+    """
+    summary = fit_of_map(part_of_roughness(seed, rolloff), tmp_path)
+    fitted, surface = summary.spectrum.fit, suggested(summary)
+    scene = build_scene(surface, HalfSpace(), 2 * surface.smallest_grid())
+    waves, side = scene.shells, surface.length
+    middle = (waves.q > 4 * fitted.q_1) & (waves.q < 0.5 * fitted.q_s)
+    density = waves.height[middle] / waves.modes[middle] * side**2
+    of_fit = fitted.density(waves.q[middle]) * (side / 2) ** 2
+    assert density == pytest.approx(of_fit, rel=0.01)
+    assert moments(waves).gradient == pytest.approx(summary.moments.gradient, rel=0.1)
+
+
+def test_the_random_surface_of_equal_tiles_has_the_density_of_one(tmp_path):
+    """On twice the sides |h(q)|^2 is a quarter; longer waves add to the rms height."""
+    tile = SelfAffine(cutoff=0.05).heights(128)
+    summary = fit_of_map(np.tile(tile, (2, 2)), tmp_path, periodic=True)
+    larger = SelfAffine(rolloff=0.25, cutoff=0.025).heights(256)
+    exact = 1e-7 * 0.5 * larger.std() / tile.std()
+    assert suggested(summary).h_std == pytest.approx(exact, rel=1e-3)
 
 
 @pytest.mark.parametrize("seed", range(4))

@@ -162,9 +162,10 @@ def summary_text(summary: SurfaceSummary) -> str:
     theories = {"spectrum": summary.scene}
     random: list[str] = []
     if nearest is not None and not _reason_against(nearest, grid.length):
-        table = _table(nearest, grid.length)
-        model = SelfAffine.model_validate(table)
-        theories["fit"] = build_scene(model, HalfSpace(), first_grid(model))
+        copies = summary.surface.within("periodic").copies
+        tiles = copies**2 if copies > 1 else summary.scene.texture.tiles
+        table = _table(nearest, grid.length, grid.area / tiles)
+        theories["fit"] = _scene(table)
         random = ["random surface with the fitted spectrum:", "", "[surface]"]
         random += [f"{key} = {json.dumps(value)}" for key, value in table.items()]
     if grid.dimension == 2:
@@ -227,15 +228,29 @@ def _fit_lines(nearest: SelfAffineFit, length: float, metres: str) -> list[str]:
     return lines
 
 
-def _table(nearest: SelfAffineFit, length: float) -> dict[str, Any]:
-    """The fit as a table [surface] of a run spec."""
+def _table(nearest: SelfAffineFit, length: float, area: float) -> dict[str, Any]:
+    """The fit as a table [surface] of a run spec, on a square cell of side `length` [m].
+
+    Where this is the side of a mirrored map, the cell has longer waves than the part of the surface
+    that the fit is of. |h(q)|^2 times the area, `area` [m^2] of this part, is that of the fit; the
+    rms height is another one.
+    """
     rolloff = nearest.rolloff_wavelength
     numbers = {
-        "rolloff": rolloff / length if rolloff else 1.0,
+        "rolloff": (rolloff or 2 * np.pi / nearest.q_1) / length,
         "hurst": min(max(nearest.hurst, MIN_HURST), 1.0),
         "cutoff": nearest.cutoff_wavelength / length,
         "h_std": nearest.rms_height,
         "length": length,
     }
     rounded = {key: float(f"{value:.4g}") for key, value in numbers.items()}
-    return {"kind": "self-affine"} | ({} if rolloff else {"spectrum": "cutoff"}) | rounded
+    table = {"kind": "self-affine"} | ({} if rolloff else {"spectrum": "cutoff"}) | rounded
+    waves = _scene(table).shells
+    variance = np.sum(waves.modes * nearest.density(waves.q)) * area / length**2
+    return table | {"h_std": float(f"{np.sqrt(variance):.4g}")}
+
+
+def _scene(table: dict[str, Any]) -> Scene:
+    """The random surface of a table [surface] under a half-space of unit modulus."""
+    model = SelfAffine.model_validate(table)
+    return build_scene(model, HalfSpace(), first_grid(model))
