@@ -7,7 +7,8 @@
 Default surface with lambda_s = L/50. A solve that ends without a last recomputation of sigma keeps
 the rounding of its updates, and that of a start on tiles (`--on-tiles`). The true error is the rms
 difference to sigma = K u + p; the estimate is that by which the solve ends
-(`gfmd_cli/solvers/loop.py`). One row for each n; docs/solver_measurements.md has the range.
+(`gfmd_cli/solvers/loop.py`). The increase is that of the residual when sigma is computed from u.
+One row for each n; docs/solver_measurements.md has the ranges.
 """
 
 import argparse
@@ -51,13 +52,14 @@ def final_state(contact: Contact, tolerance: float, *, on_tiles: bool) -> State 
     return state
 
 
-def ratio(contact: Contact, state: State | None) -> float | None:
-    """True error over its estimate; None for a solve that ends with sigma computed from u."""
+def compared(contact: Contact, state: State | None) -> tuple[float, float] | None:
+    """Error and increase over the estimate; None for a solve that ends with sigma from u."""
     if state is None or state.exact:
         return None
     estimate = hypot(state.rounding, contact.rounding(state.u))
     exact = contact.stress(state.u, out=contact.grid.empty())
-    return contact.as_residual(float(np.square(exact - state.sigma).sum())) / estimate
+    error = contact.as_residual(float(np.square(exact - state.sigma).sum()))
+    return error / estimate, (contact.residual(state.u, exact) - state.residual) / estimate
 
 
 def main() -> None:
@@ -70,7 +72,7 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, nargs="+", default=[0])
     parser.add_argument("--on-tiles", action="store_true")
     options = parser.parse_args()
-    print_head("n", "solves", "ended without recomputation", "error over estimate")
+    print_head("n", "solves", "ended without recomputation", "error over estimate", "increase")
     for n in options.exponents:
         ratios = []
         for points, seed in product(options.points, options.seeds):
@@ -78,10 +80,11 @@ def main() -> None:
             for p_star, tolerance in product(options.p_star, options.tolerance):
                 contact = scene.contact(p_star)
                 state = final_state(contact, tolerance, on_tiles=options.on_tiles)
-                ratios.append(ratio(contact, state))
-        known = [value for value in ratios if value is not None]
-        span = f"{min(known):.2g} to {max(known):.2g}" if known else ""
-        print_row(f"{n:g}", len(ratios), len(known), span)
+                ratios.append(compared(contact, state))
+        known = [values for values in ratios if values is not None]
+        errors, increases = zip(*known, strict=True) if known else ([np.nan], [np.nan])
+        span = f"{min(errors):.2g} to {max(errors):.2g}"
+        print_row(f"{n:g}", len(ratios), len(known), span, f"{max(increases):.2g}")
 
 
 if __name__ == "__main__":
