@@ -14,6 +14,7 @@ from pathlib import Path
 from gfmd_cli.cli.progress import Reporter
 from gfmd_cli.errors import InputError
 from gfmd_cli.spec.parse import read_spec
+from gfmd_cli.status import counted
 from gfmd_cli.study.run import RunOptions, run_study
 
 TRAINING, TEST = range(100, 108), range(200, 208)
@@ -202,8 +203,7 @@ def main() -> None:
             with Reporter(True) as report:
                 store = arguments.folder / f"{name}.h5"
                 outcome = run_study(spec, source, store, report, RunOptions(jobs=1))
-            counts = ", ".join(f"{count} {status}" for status, count in outcome.items())
-            print(f"{path.stem}: {counts}", flush=True)
+            print(f"{path.stem}: {counted(outcome)}", flush=True)
 
 
 if __name__ == "__main__":

@@ -164,7 +164,7 @@ def summary_text(summary: SurfaceSummary) -> str:
     if nearest is not None and not _reason_against(nearest, grid.length):
         copies = summary.surface.within("periodic").copies
         tiles = copies**2 if copies > 1 else summary.scene.texture.tiles
-        table = _table(nearest, grid.length, grid.area / tiles)
+        table = _table(nearest, grid.length, grid.area / tiles)  # the fit is that of one tile
         theories["fit"] = _scene(table)
         random = ["random surface with the fitted spectrum:", "", "[surface]"]
         random += [f"{key} = {json.dumps(value)}" for key, value in table.items()]
@@ -231,9 +231,9 @@ def _fit_lines(nearest: SelfAffineFit, length: float, metres: str) -> list[str]:
 def _table(nearest: SelfAffineFit, length: float, area: float) -> dict[str, Any]:
     """The fit as a table [surface] of a run spec, on a square cell of side `length` [m].
 
-    Where this is the side of a mirrored map, the cell has longer waves than the part of the surface
-    that the fit is of. |h(q)|^2 times the area, `area` [m^2] of this part, is that of the fit; the
-    rms height is another one.
+    The fit is that of `area` [m^2], for a mirrored map the area of the map, not of the cell. The
+    spectral density, |h(q)|^2 times the area, is the same on the cell; the rms height is larger, as
+    the cell has longer waves.
     """
     rolloff = nearest.rolloff_wavelength
     numbers = {

@@ -95,7 +95,7 @@ def locked(
                     try:
                         yield True
                     finally:
-                        fcntl.flock(file, fcntl.LOCK_UN)  # a process forked inside has it, too
+                        fcntl.flock(file, fcntl.LOCK_UN)  # a process forked meanwhile holds it, too
                     return
                 continue
         with _owned(path.with_name(f"{path.name}.owner"), shared, wait, waits) as acquired:

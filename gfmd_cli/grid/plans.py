@@ -152,7 +152,7 @@ def planned_transforms(make: Callable[[Planner], T], size: int = 0) -> T:
     fftw = partial(pyfftw.FFTW, planning_timelimit=PLANNING_SECONDS[0] + PLANNING_SECONDS[1] * size)
     with _planner:
         if are_estimated():
-            pyfftw.forget_wisdom()  # FFTW prefers to an estimate whatever it has measured
+            pyfftw.forget_wisdom()  # FFTW does not estimate what it has measured
             return make(partial(fftw, flags=("FFTW_ESTIMATE",)))
         if _known_to != _planning.get():  # a run in another thread has planned since
             _forget()

@@ -134,9 +134,9 @@ def fill_missing(
     exact = np.count_nonzero(holes) <= MAX_EXACT
     weights = np.resize(min(spacing) / np.array(spacing), 2) ** 2  # of the axes of `known`
     filled = (_harmonic if exact else _smooth)(known, holes, weights, periodic)
-    low = known.min(where=~holes, initial=np.inf)
+    low = known.min(where=~holes, initial=np.inf)  # only rounding exceeds the known heights
     high = known.max(where=~holes, initial=-np.inf)
-    return np.clip(filled, low, high, out=filled).reshape(heights.shape)  # less the rounding
+    return np.clip(filled, low, high, out=filled).reshape(heights.shape)
 
 
 def _smooth(known: Field, missing: Mask, weights: Field, periodic: bool) -> Field:

@@ -31,7 +31,7 @@ _caches: list[Any] = []
 
 
 def surface_cache(maxsize: int) -> Callable[[Function], Function]:
-    """Cache the results of a function, or method of surfaces, until `forget_files` is called."""
+    """Cache the results of a function or method until `forget_files` is called."""
 
     def cached(function: Function) -> Function:
         keep = lru_cache(maxsize)(function)
@@ -47,7 +47,7 @@ def surface_cache(maxsize: int) -> Callable[[Function], Function]:
 
 
 def forget_files() -> None:
-    """Drop what follows from files, which may change, and from surfaces, with the present plans."""
+    """Drop all cached results: files may change, and other plans give other last bits."""
     for cache in _caches:
         cache.cache_clear()
 

@@ -19,12 +19,13 @@ SIGNALS = (
 
 
 def _handled_signals() -> list[signal.Signals]:
-    """The signals that this process was not started to ignore, as under nohup.
+    """The signals that this program may handle.
 
-    Nor those that a program takes in which Python is embedded: their handlers cannot be restored.
+    Others are ignored, as under nohup, or have a handler that was not set from Python (None) and
+    could not be restored, as in a program that embeds Python.
     """
-    others = (signal.SIG_IGN, None)
-    return [number for number in SIGNALS if signal.getsignal(number) not in others]
+    left_alone = (signal.SIG_IGN, None)
+    return [number for number in SIGNALS if signal.getsignal(number) not in left_alone]
 
 
 _interruptible = False  # whether the main thread may be interrupted now

@@ -154,12 +154,13 @@ def fig06(studies: StoredStudies, folder: Path) -> list[Finding]:
         if np.any(high) and group.n <= 3:
             heavy[style.label] = estimate(lambda a: np.abs(a - 1).max(), a.only(high))
         if group.n == 0:
-            theory = group.theory.a_r[p >= HEAVY]
-            exact = einstein_solid.contact_area(einstein_solid.non_contact_height(p[p >= HEAVY]))
+            theory, at = group.theory.a_r[p >= HEAVY], p[p >= HEAVY]
+            exact = einstein_solid.contact_area(einstein_solid.non_contact_height(at))
             ratios = (1 - theory) / (1 - exact)
             gaussian = (
                 f" Gaussian heights have {np.abs(exact / theory - 1).max():.3f} at n = 0 (Eqs. 36, "
-                f"38); 1 - a_r itself is {ratios.min():.1f} to {ratios.max():.1f} times too large there."
+                f"38); 1 - a_r itself is {ratios.min():.1f} to {ratios.max():.1f} times too large "
+                f"there for p* = {at.min():g} to {at.max():g}."
             )
         xs, ys = [*xs, p], [*ys, a.value[known]]
     ratio.axes.axhline(1.0, color="black", lw=0.9)
