@@ -25,6 +25,7 @@ def task(index, seconds, elastomer="a"):
     return SimpleNamespace(
         index=index,
         seconds=seconds,
+        seconds_at=lambda p_star: seconds * p_star / 0.1,
         elastomer=elastomer,
         surface=SimpleNamespace(dimension=2),
         size=64**2,
@@ -41,10 +42,8 @@ def clock_of(time, *tasks, jobs=1):
     return RemainingTime(tasks, jobs, lambda: time.now)
 
 
-def word(index, event, residual=float("nan"), points=64, status=None):
-    return Progress(
-        index, event, "", points=points, residual=residual, status=status, size=points**2
-    )
+def word(index, event, residual=float("nan"), points=64, **others):
+    return Progress(index, event, "", points=points, residual=residual, size=points**2, **others)
 
 
 def test_before_any_task_the_forecast_is_told(time):
@@ -85,6 +84,18 @@ def test_near_its_end_a_task_is_told_by_its_residual(time):
     time.now = 10.0
     clock.update(word(0, "step", 10**-5.9))
     assert 0.2 < clock.left() < 0.25
+
+
+def test_a_pressure_in_other_units_is_forecast_once_it_is_known(time):
+    """Until a task of its elastomer has ended, whose time has the pressure in it."""
+    clock = clock_of(time, task(0, 100.0), task(1, 100.0), jobs=2)
+    clock.update(word(0, "start"))
+    clock.update(word(0, "step", 1e-1, points=32, p_star=0.5))
+    assert clock.left() == 500.0
+    clock.update(word(1, "start"))
+    time.now = 300.0
+    clock.update(word(1, "end", status=Status.CONVERGED))
+    assert clock.left() == 150.0  # at least half of the elapsed time
 
 
 def test_little_remains_after_the_last_step(time):

@@ -35,6 +35,8 @@ class Progress(NamedTuple):
     """Estimated time that they take."""
     size: int = 0
     """Number of points of the grid."""
+    p_star: float = float("nan")
+    """Reduced pressure of the solve."""
 
 
 Report = Callable[[Progress], None]

@@ -126,9 +126,12 @@ class Task:
     @property
     def seconds(self) -> float:
         """Time that the task is expected to take on one thread, within a factor of about three."""
+        return self.seconds_at(self.load if self.quantity == "p_star" else forecast.P_STAR)
+
+    def seconds_at(self, p_star: float) -> float:
+        """The same with a load of about this reduced pressure."""
         is_searched = bool(models.LOADS[self.quantity].searched)
         solves = forecast.solves(is_searched, self.accuracy is not None)
-        p_star = self.load if self.quantity == "p_star" else forecast.P_STAR
         exponent, tolerance = self.elastomer.exponent, self.solver.tolerance
         pairs = forecast.pairs(exponent, p_star, tolerance, self.boundary)
         pairs = solves * pairs * self.solver.relative_time + forecast.OTHER_PAIRS

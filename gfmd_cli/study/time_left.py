@@ -29,6 +29,8 @@ class _Running:
     first: float = float("nan")
     """First residual on that grid."""
     last: float = float("nan")
+    p_star: float = float("nan")
+    """Reduced pressure, which a load in other units has only on a surface."""
 
 
 class RemainingTime:
@@ -74,7 +76,7 @@ class RemainingTime:
             state = self.running[index]
             if progress.size != state.size:
                 state.size, state.grid_started, state.first = progress.size, now, progress.residual
-            state.last = progress.residual
+            state.last, state.p_star = progress.residual, progress.p_star
         elif progress.event == "end":
             state = self.running.pop(index, _Running(now))
             if progress.status is not None and progress.status.is_solved:
@@ -101,7 +103,10 @@ class RemainingTime:
         """Remaining seconds of a running task."""
         task, state, now = self.tasks[index], self.running[index], self.now()
         spent = now - state.started
-        forecast = task.seconds * self._speed_ratio(task.elastomer)
+        # The ratio of an elastomer has the pressures of its tasks, where the forecast has not.
+        is_known = task.elastomer not in self.forecast and isfinite(state.p_star)
+        forecast = task.seconds_at(state.p_star) if is_known else task.seconds
+        forecast *= self._speed_ratio(task.elastomer)
         left = max(forecast - spent, MIN_REMAINING_SHARE * spent)
         if state.size == task.size and isfinite(state.first) and state.last > 0:
             total_decrease = log(max(state.first / task.solver.tolerance, 1.0))
