@@ -127,25 +127,27 @@ def fill_missing(
     spacing : distance of the points along each axis, in any unit
     periodic : whether points at opposite edges are neighbours
     """
-    known = np.atleast_2d(np.where(missing, 0.0, heights))
-    holes = np.atleast_2d(missing)
-    if not holes.any():
-        return known.reshape(heights.shape)
-    exact = np.count_nonzero(holes) <= MAX_EXACT
-    weights = np.resize(min(spacing) / np.array(spacing), 2) ** 2  # of the axes of `known`
-    filled = (_harmonic if exact else _smooth)(known, holes, weights, periodic)
-    low = known.min(where=~holes, initial=np.inf)  # only rounding exceeds the known heights
-    high = known.max(where=~holes, initial=-np.inf)
-    return np.clip(filled, low, high, out=filled).reshape(heights.shape)
+    weights = np.resize(min(spacing) / np.array(spacing), 2) ** 2  # of the axes of two
+    filled = _filled(np.atleast_2d(heights), np.atleast_2d(missing), weights, periodic)
+    return filled.reshape(heights.shape)
+
+
+def _filled(heights: Field, missing: Mask, weights: Field, periodic: bool) -> Field:
+    """See `fill_missing`; `weights` of the neighbours along each of the two axes."""
+    known = np.where(missing, 0.0, heights)
+    if not missing.any():
+        return known
+    exact = np.count_nonzero(missing) <= MAX_EXACT
+    filled = (_harmonic if exact else _smooth)(known, missing, weights, periodic)
+    low = known.min(where=~missing, initial=np.inf)  # only rounding exceeds the known heights
+    high = known.max(where=~missing, initial=-np.inf)
+    return np.clip(filled, low, high, out=filled)
 
 
 def _smooth(known: Field, missing: Mask, weights: Field, periodic: bool) -> Field:
     """Filling from a map of half the resolution; `known` is zero where missing."""
     count, total = block_sums((~missing).astype(np.float64), 2), block_sums(known, 2)
-    spacing = tuple(weights**-0.5)
-    coarse = fill_missing(
-        total / np.maximum(count, 1.0), count == 0, spacing=spacing, periodic=periodic
-    )
+    coarse = _filled(total / np.maximum(count, 1.0), count == 0, weights, periodic)
     for axis in (0, 1):
         coarse = coarse.repeat(2, axis)
     filled = np.where(missing, coarse[: known.shape[0], : known.shape[1]], known)
