@@ -23,12 +23,13 @@ from gfmd_cli.analysis.compare import compare as compare_study
 from gfmd_cli.analysis.export import as_dataset
 from gfmd_cli.analysis.table import Group, Table, TableColumn, plus_minus
 from gfmd_cli.errors import InputError
+from gfmd_cli.files.file_cache import forget_files
 from gfmd_cli.grid.arrays import Field, Mask
 from gfmd_cli.grid.blas import one_blas_thread
 from gfmd_cli.maps.given_heights import write_heights
 from gfmd_cli.physics.error_estimates import Verdict
 from gfmd_cli.physics.file_surface import FileSurface
-from gfmd_cli.physics.indenters import SMALLEST_GRID, forget_files
+from gfmd_cli.physics.indenters import SMALLEST_GRID
 from gfmd_cli.spec.models import Spec
 from gfmd_cli.spec.parse import read_spec, read_tables
 from gfmd_cli.status import Status, counted

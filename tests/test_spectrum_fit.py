@@ -7,10 +7,10 @@ from spectrum_fits import gaussian_roughness
 
 from gfmd_cli.analysis.surface_summary import summarise, summary_text
 from gfmd_cli.errors import InputError
+from gfmd_cli.files.file_cache import forget_files
 from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.physics.elastomers import HalfSpace
 from gfmd_cli.physics.file_surface import FileSurface
-from gfmd_cli.physics.indenters import forget_files
 from gfmd_cli.physics.persson import shells
 from gfmd_cli.physics.scenes import build_scene
 from gfmd_cli.physics.self_affine import SelfAffine

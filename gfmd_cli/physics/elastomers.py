@@ -16,13 +16,13 @@ from pydantic import model_validator
 
 from gfmd_cli.errors import InputError
 from gfmd_cli.files.checksums import Version, file_version
+from gfmd_cli.files.file_cache import file_cache
 from gfmd_cli.grid.arrays import Field, Mask
 from gfmd_cli.grid.fft_grid import ALL_ROWS, Shape
 from gfmd_cli.maps.interpolation import monotone_cubic
 from gfmd_cli.physics.compliance_transforms import Compliance, separated
 from gfmd_cli.physics.contact import Scene
 from gfmd_cli.physics.free_compliance import Spacings
-from gfmd_cli.physics.indenters import surface_cache
 from gfmd_cli.physics.linear_elastomer import LinearElastomer
 from gfmd_cli.physics.persson import gamma_slab
 from gfmd_cli.spec_table import FilePath, Positive
@@ -379,7 +379,7 @@ def _read_table(path: Path) -> Field:
         ) from error
 
 
-@surface_cache(maxsize=4)
+@file_cache(maxsize=4)
 def _table(path: Path, version: Version) -> Field:
     """The columns of a table in this version; cached, because every block of rows asks for k."""
     if path.stat().st_size > MAX_TABLE_BYTES or not path.is_file():

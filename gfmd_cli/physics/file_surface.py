@@ -17,6 +17,7 @@ import numpy as np
 from pydantic import Field as Key
 
 from gfmd_cli.errors import InputError
+from gfmd_cli.files.file_cache import file_cache
 from gfmd_cli.grid.arrays import Field, Mask, MaskedField
 from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.maps import map_warnings, misread
@@ -44,7 +45,7 @@ from gfmd_cli.maps.noise import noise_beyond, noisy
 from gfmd_cli.maps.pictures import Picture, picture
 from gfmd_cli.maps.tip import blunted
 from gfmd_cli.maps.topography import Region, Topography, read_topography
-from gfmd_cli.physics.indenters import POINTS_ROUNDING, SMALLEST_GRID, RigidSurface, surface_cache
+from gfmd_cli.physics.indenters import POINTS_ROUNDING, SMALLEST_GRID, RigidSurface
 from gfmd_cli.spec_table import FilePath, Positive
 from gfmd_cli.units import count, labelled
 
@@ -123,7 +124,7 @@ class FileSurface(RigidSurface):
         """1 for a line profile, 2 for a map."""
         return self._topography().heights.ndim
 
-    @surface_cache(maxsize=16)
+    @file_cache(maxsize=16)
     def smallest_grid(self) -> int:
         """Number of points of the map along x; cached, because scenes ask for it several times.
 
@@ -193,7 +194,7 @@ class FileSurface(RigidSurface):
         """Whether the map is interpolated by a Fourier series."""
         return self.applied_interpolation() == "fourier"
 
-    @surface_cache(maxsize=16)
+    @file_cache(maxsize=16)
     def applied_interpolation(self) -> Interpolation:
         """The interpolation on grids finer than the map; cached, as it may need a transform."""
         if self.interpolation is not None:
@@ -472,17 +473,17 @@ class TaperedMap(FileSurface):
         return super().heights_on(grid) / rms
 
 
-_read = surface_cache(maxsize=4)(read_topography)
+_read = file_cache(maxsize=4)(read_topography)
 """Cached, because the same surface is sampled on several grids."""
 
 
-@surface_cache(maxsize=4)
+@file_cache(maxsize=4)
 def _prepared(surface: FileSurface) -> Field:
     """The periodic heights [m], levelled, filled in and filtered; cached like the file."""
     return make_periodic(_filtered(surface), surface.edges or "none", surface.taper)
 
 
-@surface_cache(maxsize=4)
+@file_cache(maxsize=4)
 def _filtered(surface: FileSurface) -> Field:
     """The heights [m], levelled, filled in and filtered, before their edges are changed.
 
@@ -510,7 +511,7 @@ def _filtered(surface: FileSurface) -> Field:
     return gaussian_filter(heights, spacing, cutoff, periodic=surface._is_repeated())
 
 
-@surface_cache(maxsize=4)
+@file_cache(maxsize=4)
 def _filled(surface: FileSurface) -> Field:
     """The levelled heights [m], with the missing ones filled in; cached like the file."""
     missing, heights = surface._topography().missing, surface._levelled()
@@ -528,7 +529,7 @@ def _filled(surface: FileSurface) -> Field:
     return fill_missing(heights, missing, spacing=spacing, periodic=periodic)
 
 
-@surface_cache(maxsize=16)
+@file_cache(maxsize=16)
 def _warnings_on_heights(surface: FileSurface) -> tuple[str, ...]:
     """Warnings about artefacts of a scan. Cached: every contact of a study has the same."""
     topography, scale = surface._topography(), surface.scale

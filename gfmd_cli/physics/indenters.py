@@ -5,16 +5,15 @@ middle of the periodic cell. Equation numbers are those of Mueser, "Elastic cont
 rough surfaces across the spatial dimensions".
 """
 
-from collections.abc import Callable
-from functools import lru_cache, wraps
 from math import ceil
-from typing import Annotated, Any, ClassVar, Literal, Self, TypeVar, cast
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import Field as Key
 from pydantic import model_validator
 
 from gfmd_cli.errors import InputError
+from gfmd_cli.files.file_cache import file_cache
 from gfmd_cli.grid.arrays import Field, Mask, MaskedField
 from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.maps.pictures import Picture
@@ -26,30 +25,6 @@ MAX_POINTS = 2**17  # along an axis; upper limit, guards against typing errors
 MAX_ASPECT_RATIO = 1e9  # side along y over side along x; a choice: no grid has so many points
 SLOPE_STEP = 1e-3  # of a distance from the middle, over which a slope is taken
 POINTS_ROUNDING = 1e-9  # of a number of points that follows from a ratio of sides
-Function = TypeVar("Function", bound=Callable[..., Any])
-_caches: list[Any] = []
-
-
-def surface_cache(maxsize: int) -> Callable[[Function], Function]:
-    """Cache the results of a function or method until `forget_files` is called."""
-
-    def cached(function: Function) -> Function:
-        keep = lru_cache(maxsize)(function)
-        _caches.append(keep)
-
-        @wraps(function)
-        def call(*arguments: Any, **options: Any) -> Any:
-            return keep(*arguments, **options)
-
-        return cast(Function, call)
-
-    return cached
-
-
-def forget_files() -> None:
-    """Drop all cached results: files may change, and other plans give other last bits."""
-    for cache in _caches:
-        cache.cache_clear()
 
 
 class RigidSurface(SpecTable):
@@ -195,7 +170,7 @@ class RigidSurface(SpecTable):
         """A map that is not periodic, mirrored to twice its sides; None for other surfaces."""
         return None
 
-    @surface_cache(maxsize=16)
+    @file_cache(maxsize=16)
     def peak(self) -> float | None:
         """Height of the highest point [m], between grid points too; None where it is unknown."""
         if not self.band_limited:

@@ -6,10 +6,11 @@ from math import nan, pi, prod
 import numpy as np
 
 from gfmd_cli.errors import InputError
+from gfmd_cli.files.file_cache import file_cache
 from gfmd_cli.grid.arrays import Field, row_blocks
 from gfmd_cli.grid.modes import multiplicity
 from gfmd_cli.physics.elastomers import HalfSpace
-from gfmd_cli.physics.indenters import RigidSurface, surface_cache
+from gfmd_cli.physics.indenters import RigidSurface
 from gfmd_cli.physics.linear_elastomer import LinearElastomer
 from gfmd_cli.physics.persson import Shells
 from gfmd_cli.physics.scenes import build_scene
@@ -71,7 +72,7 @@ def spectrum(shells: Shells, sides: tuple[float, ...], points: tuple[int, ...]) 
     return Spectrum(moment / total, total * per_mode, modes, fitted * per_mode, nearest, no_fit)
 
 
-@surface_cache(maxsize=4)
+@file_cache(maxsize=4)
 def map_spectrum(surface: RigidSurface) -> Spectrum | None:
     """The spectrum of a map with borders, tapered towards them; None for any other surface.
 
@@ -85,7 +86,7 @@ def map_spectrum(surface: RigidSurface) -> Spectrum | None:
     return spectrum(scene.shells, scene.grid.sides, scene.grid.whole_shape)
 
 
-@surface_cache(maxsize=4)
+@file_cache(maxsize=4)
 def short_wave_factor(surface: RigidSurface, elastomer: LinearElastomer) -> float:
     """Factor by which the shortest waves of a map increase Delta_sigma, Eq. (23).
 

@@ -9,10 +9,10 @@ from threading import Event
 from time import monotonic
 
 from gfmd_cli.errors import InputError, Interrupted, SpaceError
+from gfmd_cli.files.file_cache import forget_files
 from gfmd_cli.files.locks import AS_LONG_AS_NEEDED, Waits
 from gfmd_cli.grid import plans
 from gfmd_cli.grid.ranks import Ranks, is_root, on_root, shared_errors
-from gfmd_cli.physics.indenters import forget_files
 from gfmd_cli.spec.models import Spec
 from gfmd_cli.status import Status
 from gfmd_cli.study.context import Progress, Report, SolveContext, WorkerOptions
