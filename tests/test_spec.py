@@ -153,7 +153,9 @@ def test_task_ids_do_not_depend_on_the_output(read):
         (('"power"', '"powr"'), ["elastomer.kind", "'powr'", "did you mean 'power'", ":7"]),
         (('kind = "power"\n', ""), ["elastomer.kind", "is missing", "half-space"]),
         (("n = 1", 'n = "1"'), ["elastomer.n", "valid number", "'1'", ":8"]),
-        (("n = 1", "n = true"), ["elastomer.n", "valid number", "True"]),
+        (("n = 1", "n = true"), ["elastomer.n", "valid number", "got true"]),
+        (("n = 1", "n = 2026-01-02"), ["elastomer.n", "valid number, got 2026-01-02"]),
+        (("[study]", "[output]\nspectra = 1\n[study]"), ["must be true or false, got 1"]),
         (("n = 1", "n = 4.5"), ["elastomer.n", "less than or equal to 4", "4.5"]),
         (("n = 1", "n = [0, -0.5]"), ["elastomer.n[1]", "greater than or equal to 0", "-0.5"]),
         (("n = 1", "n = nan"), ["elastomer.n", "nan"]),
@@ -255,6 +257,8 @@ def test_bad_input_names_key_place_and_what_is_allowed(read, change, words):
         ("nonsense", ["key.name=value"]),
         ("study.name.x=1", ["not a table"]),
         ("grid.points={", ["not a TOML value"]),
+        ("load.p_star=0.1\n[study]\nname='other'", ["is not a TOML value"]),
+        ("surface={kind='file', path=\"a\\u0000b\"}", ["surface.path", "no such file"]),
         ("gird.points=8", ["--set gird.points=8: unknown table 'gird'"]),
     ],
 )
@@ -275,6 +279,22 @@ def test_an_unresolved_cutoff_names_the_grid_that_would_do(read):
     with pytest.raises(InputError, match=r"spec\.toml: .*64 points .* 100 or more"):
         plan(read(("0.05", "0.02")))
     assert plan(read(("0.05", "0.02"), ("points = 64", "points = 100")))
+
+
+@pytest.mark.parametrize(
+    "overrides",
+    [
+        (
+            "surface={kind='self-affine', length=5e-324, length_y=1}",
+            "grid={points=512, points_y=16}",
+        ),
+        ("surface={kind='punch', radius=5e-324}",),
+        ("surface={kind='ridge', width=5e-324}",),
+    ],
+)
+def test_a_surface_that_takes_more_points_than_can_be_counted_is_refused(read, overrides):
+    with pytest.raises(InputError, match=r"it takes [12]e\+15, but at most 131072 are allowed"):
+        plan(read(overrides=overrides))
 
 
 def test_a_punch_narrower_than_a_spacing_is_refused(read):
