@@ -4,6 +4,7 @@ from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from itertools import product
 from math import prod
+from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple, Self, TypeVar, get_args
 
 import numpy as np
@@ -23,6 +24,8 @@ from gfmd_cli.spec_table import Positive, SpecTable
 MAX_VALUES = 100_000  # of one list or ladder; upper limit, guards against typing errors
 MAX_DECADES = 300.0  # of which a power of ten does not overflow
 LADDER_ROUNDINGS = 8  # of a power of ten, by which a value of the ladder may lie above `to`
+OF_OTHERS = {".csv", ".nc", ".vti", ".html", ".json", ".toml"}
+"""Suffixes of files that other commands write or read."""
 SWEPT = ("surface", "elastomer", "grid", "solver")
 REPEATED = (*SWEPT, "sweep")  # tables that may be given several times
 
@@ -348,6 +351,15 @@ class Spec(SpecTable):
     places: dict[str, list[tuple[int | None, ...]]]
     """Where each entry of a table, and each load, stands in each group of paired lists; None where
     the table has no list of the pair."""
+
+    def study_path(self, output: Path | None = None) -> Path:
+        """The study file, or `output`. Raises InputError for a suffix of files of another kind."""
+        if output is not None and output.suffix.lower() in OF_OTHERS:
+            raise InputError(
+                f"{output}: a study is an HDF5 file, such as {output.stem}.h5; gfmd export writes "
+                "CSV, netCDF and VTK, gfmd report HTML"
+            )
+        return output or Path(f"{self.study.name}.h5")
 
     def combinations(self) -> Iterator[tuple[dict[str, int], list[float]]]:
         """The entries of the swept tables that go together, by table, and their loads."""
