@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from specs import power_spec
 
 from gfmd_cli.errors import InputError
+from gfmd_cli.physics.contact import is_solved
 from gfmd_cli.spec.differences import differences
 from gfmd_cli.spec.parse import read_spec, read_tables
 from gfmd_cli.spec.schema import spec_schema
@@ -94,6 +95,16 @@ def test_the_end_of_a_ladder_is_a_value_if_it_is_one_of_the_ladder(read, first, 
     pressures = ladder(read, from_=first, to=to, per_decade=per_decade).load.values()
     assert pressures[-1] == pytest.approx(to, rel=1e-12)
     assert max(pressures) <= to * (1 + 1e-12)
+
+
+@pytest.mark.parametrize("per_decade", [1, 3, 1000])
+def test_a_ladder_of_reduced_pressures_may_end_at_the_largest_one(read, per_decade):
+    """Its last value, 1e-5 * 10^11, is above 1e6 by rounding."""
+    ends = f"load.p_star={{from=1e-5, to=1e6, per_decade={per_decade}}}"
+    assert read(overrides=(ends,)).load.values()[-1] == pytest.approx(1e6, rel=1e-12)
+    assert is_solved(1e6 * (1 + 1e-13))
+    with pytest.raises(InputError, match=r"p_star must be from 1e-30 to 1e\+06, got 1000000\.1"):
+        read(overrides=("load.p_star=1000000.1",))
 
 
 @given(

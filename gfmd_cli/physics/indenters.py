@@ -354,7 +354,10 @@ class Punch(RoundIndenter):
     def _check_rim(self) -> None:
         side = min(self.sides)
         if self.radius >= side / 2:
-            raise ValueError(f"radius = {self.radius:g} leaves no rim in a cell of {side:g}")
+            raise ValueError(
+                f"radius = {self.radius:g} leaves no rim in a cell of {side:g}: "
+                f"less than {side / 2:g} is allowed"
+            )
 
     def on_cell(self, points: int, points_y: int) -> Self:
         """See `RigidSurface.on_cell`. Raises InputError where the radius leaves no rim."""

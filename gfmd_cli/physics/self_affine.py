@@ -74,7 +74,7 @@ class SelfAffine(RigidSurface):
         """
         if self.rolloff > LARGEST_ROLLOFF:
             raise InputError(
-                f"surface.rolloff: {self.rolloff:g} given, out of range: it is in units of "
+                f"surface.rolloff: {self.rolloff:.12g} given, out of range: it is in units of "
                 f"surface.length, and at most {LARGEST_ROLLOFF:g}"
             )
         needed = max(SMALLEST_GRID, 2 * self.highest_modes[1])

@@ -13,7 +13,7 @@ from pydantic import Field as Key
 
 from gfmd_cli.errors import InputError
 from gfmd_cli.files.checksums import file_digest
-from gfmd_cli.physics.contact import PRESSURE_RANGE
+from gfmd_cli.physics.contact import PRESSURE_RANGE, is_solved
 from gfmd_cli.physics.elastomers import Elastomer
 from gfmd_cli.physics.indenters import MAX_POINTS, SMALLEST_GRID, RigidSurface
 from gfmd_cli.physics.linear_elastomer import LinearElastomer
@@ -117,7 +117,7 @@ class Ladder(SpecTable):
     @model_validator(mode="after")
     def _rises(self) -> Self:
         if self.to < self.from_:
-            raise ValueError(f"to = {self.to:g} lies below from = {self.from_:g}")
+            raise ValueError(f"to = {self.to:.12g} lies below from = {self.from_:.12g}")
         if (count := int(self._decades * self.per_decade) + 1) > MAX_VALUES:
             raise ValueError(f"a sequence of {count} values; at most {MAX_VALUES} are allowed")
         return self
@@ -222,8 +222,8 @@ class LoadTable(SpecTable):
             raise ValueError(f"give one of {', '.join(LOADS)}")
         if self.p_star is not None:
             low, high = PRESSURE_RANGE
-            if beyond := [p for p in self.listed() if not low <= p <= high]:
-                raise ValueError(f"p_star must be from {low:g} to {high:g}, got {beyond[0]:g}")
+            if beyond := [p for p in self.listed() if not is_solved(p)]:
+                raise ValueError(f"p_star must be from {low:g} to {high:g}, got {beyond[0]:.12g}")
         if "tolerance" in self.model_fields_set and not LOADS[loads[0]].searched:
             searched = [name for name, load in LOADS.items() if load.searched]
             raise ValueError(f"tolerance belongs to {' or '.join(searched)}")
