@@ -170,8 +170,7 @@ def solve(spec: Path | str | Tables, *, heights: Any = None, threads: int = 1) -
         If the spec or the heights are invalid, contradict each other, or the spec has several
         tasks.
     """
-    if threads < 1:
-        raise InputError(f"threads = {threads}: must be at least 1")
+    _check_count("threads", threads)
     forget_files()  # they may have changed since the last call
     if heights is None:
         return _solve(spec, threads)
@@ -285,8 +284,9 @@ def run(
         After a second SIGINT (Ctrl-C). The next call resumes unfinished tasks from their last
         checkpoints.
     """
+    _check_count("jobs", jobs)
     resolved, text = _read(spec, overrides)
-    path = Path(study if study is not None else f"{resolved.study.name}.h5")
+    path = resolved.study_path(None if study is None else Path(study))
     messages: list[str] = []
 
     def watch(progress: Progress) -> None:
@@ -348,6 +348,12 @@ def dataset(study: Path | str) -> Any:
         If the study is damaged.
     """
     return as_dataset(Path(study))
+
+
+def _check_count(name: str, number: Any) -> None:
+    """Raise InputError for anything but a whole number of at least 1."""
+    if isinstance(number, bool) or not isinstance(number, int | np.integer) or number < 1:
+        raise InputError(f"{name} = {number!r}: must be a whole number, at least 1")
 
 
 def _read(spec: Path | str | Tables, overrides: tuple[str, ...] = ()) -> tuple[Spec, str]:

@@ -15,7 +15,7 @@ def scaled(largest: float, unit: str) -> tuple[float, str]:
     """A divisor for values up to `largest`, and the unit with its SI prefix."""
     if not (math.isfinite(largest) and largest > 0):
         return 1.0, unit
-    power = 3 * math.floor(math.log10(1.1 * largest) / 3)
+    power = 3 * math.floor(math.log10(1.1 * min(largest, 1e300)) / 3)
     power = min(max(power, min(PREFIXES)), max(PREFIXES))
     return 10.0**power, PREFIXES[power] + unit
 

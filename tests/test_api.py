@@ -457,9 +457,10 @@ def test_overrides_are_several_strings(tmp_path):
         run(path, overrides="grid.points=48")
 
 
-def test_no_thread_is_refused():
-    with pytest.raises(InputError, match="threads = 0"):
-        solve(TABLES, threads=0)
+@pytest.mark.parametrize("threads", [0, 1.5, True, "2", None])
+def test_threads_are_a_whole_number(threads):
+    with pytest.raises(InputError, match=f"threads = {threads!r}: must be a whole number"):
+        solve(TABLES, threads=threads)
 
 
 @pytest.mark.parametrize("kind", ["wave", "ridge", "line-parabola"])
@@ -552,18 +553,24 @@ def test_the_script_whose_types_are_checked_runs(tmp_path):
     assert script["main"](tmp_path) == pytest.approx(1)
 
 
-@pytest.mark.parametrize("jobs", [0, -1])
-def test_no_worker_at_all_is_refused(tmp_path, jobs):
+def test_a_study_does_not_replace_what_other_commands_read(tmp_path):
+    with pytest.raises(InputError, match=r"x\.toml: a study is an HDF5 file, such as x\.h5"):
+        run(TABLES, tmp_path / "x.toml")
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("jobs", [0, -1, 1.5, float("nan"), True, "2"])
+def test_workers_are_a_whole_number(tmp_path, jobs):
     spec = {
         "surface": {"kind": "self-affine", "cutoff": 0.2},
         "elastomer": {"kind": "half-space"},
         "grid": {"points": 16},
         "load": {"p_star": 0.1},
     }
-    with pytest.raises(InputError, match="at least 1 worker"):
+    with pytest.raises(InputError, match=f"jobs = {jobs!r}: must be a whole number, at least 1"):
         run(spec, tmp_path / "a.h5", jobs=jobs)
     run(spec, tmp_path / "a.h5")
-    with pytest.raises(InputError, match="at least 1 worker"):
+    with pytest.raises(InputError, match=f"jobs = {jobs!r}: must be a whole number, at least 1"):
         run(spec, tmp_path / "a.h5", jobs=jobs)
     with pytest.raises(InputError, match="unknown table '3'"):
         run(spec | {3: 4}, tmp_path / "a.h5")

@@ -116,7 +116,9 @@ def test_a_shard_takes_its_share(gfmd):
     assert gfmd("run", "spec.toml", "--shard", "5/9").exit_code == 0
 
 
-@pytest.mark.parametrize("shard", ["2/2", "-1/2", "a/b", "1", "0/0", "1/2/3", "²/3", "0/²"])
+@pytest.mark.parametrize(
+    "shard", ["2/2", "-1/2", "a/b", "1", "0/0", "1/2/3", "²/3", "0/²", "٠/٢", f"0/{5000 * '9'}"]
+)
 def test_a_bad_shard_is_refused(gfmd, shard):
     result = gfmd("run", "spec.toml", f"--shard={shard}")
     assert result.exit_code == 2
@@ -174,6 +176,19 @@ def test_an_unreadable_study_is_status_74(gfmd):
         result = gfmd(*words)
         assert result.exit_code == 74
         assert "bad.h5" in result.output
+
+
+@pytest.mark.parametrize("folder", [".", "/"])
+def test_a_folder_is_no_study_to_report(gfmd, folder):
+    result = gfmd("report", folder)
+    assert result.exit_code in (73, 74)
+    assert result.output.startswith("gfmd: ")
+
+
+def test_a_figure_of_unknown_format_is_refused_before_the_work(gfmd):
+    result = gfmd("surface", "spec.toml", "--figure", "x.jpg")
+    assert result.exit_code == 2
+    assert result.output == "gfmd: x.jpg: unknown suffix '.jpg'; allowed: .png, .pdf, .svg\n"
 
 
 def test_a_place_that_cannot_be_written_is_status_73(gfmd):

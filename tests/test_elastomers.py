@@ -248,11 +248,12 @@ def test_the_local_exponent_of_a_slab_goes_from_four_to_one():
         ("q k\n1 2\n2 3\n", "with # before words"),
         ("1,5 2,5\n2,5 3,5\n", "4 columns"),  # decimal commas
         ("1 2\n2\n", "cannot be read"),
+        ("1 2\n2 \udcff\n", "cannot be read: not UTF-8 text; the file"),
     ],
 )
 def test_bad_tables_are_refused(tmp_path, content, complaint):
     path = tmp_path / "bad.txt"
-    path.write_text(content, encoding="utf-8")
+    path.write_text(content, encoding="utf-8", errors="surrogateescape")
     with pytest.raises(InputError, match=complaint) as caught:
         Tabulated(path=path).stiffness(Q)
     assert str(path) in str(caught.value)

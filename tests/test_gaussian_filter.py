@@ -135,6 +135,19 @@ def test_a_cutoff_that_the_map_cannot_have_is_refused(tmp_path, cutoff):
         surface.smallest_grid()
 
 
+@pytest.mark.parametrize(("key", "count"), [("s_filter", 2), ("lateral_period_limit", 1)])
+@pytest.mark.parametrize("side", [0.7123457, 0.7137])
+def test_the_limits_of_a_length_that_a_message_shows_are_allowed(tmp_path, key, count, side):
+    def points(length):
+        return _map(tmp_path, _noise(17, 23), length=side, **{key: length}).smallest_grid()
+
+    with pytest.raises(InputError) as error:
+        points(1e3)
+    limits = re.findall(r", (\S+) m\b", str(error.value))
+    assert len(limits) == count
+    assert [points(float(limit)) for limit in limits] == count * [23]
+
+
 def test_a_cutoff_of_three_spacings_is_allowed(tmp_path):
     for side in (0.1, 0.7, 20e-6):
         surface = _map(tmp_path, _noise(49, 49), length=side, s_filter=side / 49 * 3)

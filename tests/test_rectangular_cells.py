@@ -129,7 +129,7 @@ def test_round_indenters_measure_distances_in_metres(points):
 
 
 def test_a_punch_without_rim_in_the_short_side_is_refused():
-    with pytest.raises(ValueError, match=r"leaves no rim in a cell of 0\.4"):
+    with pytest.raises(ValueError, match=r"leaves no rim in a cell of 0\.4: less than 0\.2 is"):
         Punch(radius=0.25, length_y=0.4)
     with pytest.raises(InputError, match=r"points_y: .* 16 .*leaves no rim in a cell of 0\.25"):
         Punch(radius=0.25).on_cell(64, 16)

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from specs import power_spec
 
 from gfmd_cli.errors import InputError
+from gfmd_cli.physics.contact import is_solved
 from gfmd_cli.spec.differences import differences
 from gfmd_cli.spec.parse import read_spec, read_tables
 from gfmd_cli.spec.schema import spec_schema
@@ -96,6 +97,16 @@ def test_the_end_of_a_ladder_is_a_value_if_it_is_one_of_the_ladder(read, first, 
     assert max(pressures) <= to * (1 + 1e-12)
 
 
+@pytest.mark.parametrize("per_decade", [1, 3, 1000])
+def test_a_ladder_of_reduced_pressures_may_end_at_the_largest_one(read, per_decade):
+    """Its last value, 1e-5 * 10^11, is above 1e6 by rounding."""
+    ends = f"load.p_star={{from=1e-5, to=1e6, per_decade={per_decade}}}"
+    assert read(overrides=(ends,)).load.values()[-1] == pytest.approx(1e6, rel=1e-12)
+    assert is_solved(1e6 * (1 + 1e-13))
+    with pytest.raises(InputError, match=r"p_star must be from 1e-30 to 1e\+06, got 1000000\.1"):
+        read(overrides=("load.p_star=1000000.1",))
+
+
 @given(
     first=st.floats(1e-6, 1e6), decades=st.floats(0, 4), more=st.floats(0, 4), per=st.floats(0.5, 9)
 )
@@ -153,7 +164,9 @@ def test_task_ids_do_not_depend_on_the_output(read):
         (('"power"', '"powr"'), ["elastomer.kind", "'powr'", "did you mean 'power'", ":7"]),
         (('kind = "power"\n', ""), ["elastomer.kind", "is missing", "half-space"]),
         (("n = 1", 'n = "1"'), ["elastomer.n", "valid number", "'1'", ":8"]),
-        (("n = 1", "n = true"), ["elastomer.n", "valid number", "True"]),
+        (("n = 1", "n = true"), ["elastomer.n", "valid number", "got true"]),
+        (("n = 1", "n = 2026-01-02"), ["elastomer.n", "valid number, got 2026-01-02"]),
+        (("[study]", "[output]\nspectra = 1\n[study]"), ["must be true or false, got 1"]),
         (("n = 1", "n = 4.5"), ["elastomer.n", "less than or equal to 4", "4.5"]),
         (("n = 1", "n = [0, -0.5]"), ["elastomer.n[1]", "greater than or equal to 0", "-0.5"]),
         (("n = 1", "n = nan"), ["elastomer.n", "nan"]),
@@ -255,6 +268,8 @@ def test_bad_input_names_key_place_and_what_is_allowed(read, change, words):
         ("nonsense", ["key.name=value"]),
         ("study.name.x=1", ["not a table"]),
         ("grid.points={", ["not a TOML value"]),
+        ("load.p_star=0.1\n[study]\nname='other'", ["is not a TOML value"]),
+        ("surface={kind='file', path=\"a\\u0000b\"}", ["surface.path", "no such file"]),
         ("gird.points=8", ["--set gird.points=8: unknown table 'gird'"]),
     ],
 )
@@ -275,6 +290,22 @@ def test_an_unresolved_cutoff_names_the_grid_that_would_do(read):
     with pytest.raises(InputError, match=r"spec\.toml: .*64 points .* 100 or more"):
         plan(read(("0.05", "0.02")))
     assert plan(read(("0.05", "0.02"), ("points = 64", "points = 100")))
+
+
+@pytest.mark.parametrize(
+    "overrides",
+    [
+        (
+            "surface={kind='self-affine', length=5e-324, length_y=1}",
+            "grid={points=512, points_y=16}",
+        ),
+        ("surface={kind='punch', radius=5e-324}",),
+        ("surface={kind='ridge', width=5e-324}",),
+    ],
+)
+def test_a_surface_that_takes_more_points_than_can_be_counted_is_refused(read, overrides):
+    with pytest.raises(InputError, match=r"it takes [12]e\+15, but at most 131072 are allowed"):
+        plan(read(overrides=overrides))
 
 
 def test_a_punch_narrower_than_a_spacing_is_refused(read):

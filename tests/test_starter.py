@@ -1,6 +1,8 @@
 import json
+import os
 import re
 import shlex
+import sys
 import tomllib
 
 import h5py
@@ -351,3 +353,12 @@ def test_the_name_of_a_scan_adds_no_line_to_the_spec(gfmd, tmp_path):
     spec = tomllib.loads((tmp_path / "spec.toml").read_text(encoding="utf-8"))
     assert "solver" not in spec
     assert spec["surface"]["path"] == name
+
+
+@pytest.mark.skipif(sys.platform == "darwin", reason="names of files are UTF-8 on macOS")
+def test_a_scan_whose_name_a_spec_cannot_contain_is_refused(gfmd, tmp_path):
+    np.save(tmp_path / "h.npy", np.random.default_rng(0).normal(size=(16, 16)))
+    name = os.fsdecode(b"h\xff.npy")
+    (tmp_path / "h.npy").rename(tmp_path / name)
+    assert "the name is not UTF-8" in gfmd("init", "spec.toml", "--from", name, status=2)
+    assert not (tmp_path / "spec.toml").exists()

@@ -1087,3 +1087,15 @@ def test_words_around_a_text_table_are_no_rows(tmp_path):
     header = "# " + " ".join(["word"] * 11)  # as many words as columns
     path.write_text(f"{header}\n{rows}\nend of data\n")
     assert read_topography(path).heights.shape == (8, 12)
+
+
+def test_a_table_whose_end_was_never_written_is_refused(tmp_path):
+    """After a crash a file can end in zero bytes in the place of its last rows."""
+    pytest.importorskip("SurfaceTopography")
+    path = tmp_path / "h.txt"
+    np.savetxt(path, np.random.default_rng(0).normal(size=(16, 16)))
+    content = path.read_bytes()
+    rows = content.splitlines(keepends=True)
+    path.write_bytes(b"".join(rows[:9]).ljust(len(content), b"\0"))
+    with pytest.raises(InputError, match=r"h\.txt:10: zero bytes in the table"):
+        read_topography(path)

@@ -15,6 +15,7 @@ from gfmd_cli.units import count, duration, labelled, percent
         (3e-9, "m", "3 nm"),
         (0.1, "N/m", "100 mN/m"),
         (1e-15, "m", "0.001 pm"),
+        (1.7e308, "Pa", "1.7e+296 TPa"),
         (0.8, "1", "0.8"),
         (1e-6, "", "1e-06"),
     ],

@@ -14,7 +14,7 @@ import numpy as np
 from gfmd_cli.analysis.curve_styles import MAX_NAMED, CurveStyle
 from gfmd_cli.analysis.selection import evenly
 from gfmd_cli.errors import INSTALL, InputError
-from gfmd_cli.files.atomic import target_of, write_whole
+from gfmd_cli.files.atomic import check_place, target_of, write_whole
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.status import SHORTFALLS, TOLERANCE_NOT_REACHED, Status
 
@@ -96,6 +96,13 @@ def styled() -> AbstractContextManager[None]:
     return rc_context(STYLE)
 
 
+def check_figure(path: Path) -> None:
+    """Raise InputError for an unknown suffix, SpaceError where the figure cannot be written."""
+    if path.suffix not in METADATA:
+        raise InputError(f"{path}: unknown suffix {path.suffix!r}; allowed: {', '.join(METADATA)}")
+    check_place(target_of(path))
+
+
 class LegendFigure:
     """A figure with a legend above its axes."""
 
@@ -168,10 +175,8 @@ class LegendFigure:
         return files
 
     def write_file(self, path: Path) -> None:
-        """Write one file, whole or not at all. Raises InputError for an unknown suffix."""
-        if path.suffix not in METADATA:
-            known = ", ".join(METADATA)
-            raise InputError(f"{path}: unknown suffix {path.suffix!r}; allowed: {known}")
+        """Write one file, whole or not at all; see `check_figure`."""
+        check_figure(path)
         self._save([path], dpi=200)
 
     def _save(self, files: Sequence[Path], dpi: int) -> None:

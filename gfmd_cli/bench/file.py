@@ -120,7 +120,8 @@ def read_bench(path: Path) -> list[Trace]:
             runs = find(file, "runs")
             return [_read_trace(find(runs, str(number))) for number in range(len(runs))]
     except DAMAGE as error:
-        raise StudyError(f"{path}: not a readable bench file, or damaged: {error}") from error
+        reason = getattr(error, "strerror", None) or error
+        raise StudyError(f"{path}: not a readable bench file, or damaged: {reason}") from error
 
 
 def _read_trace(group: Any) -> Trace:

@@ -41,7 +41,12 @@ def init(spec: Path, scan: Path | None, overrides: tuple[str, ...]) -> None:
         print_text(preparation)
         for warning in warnings:
             print_error(f"gfmd: {scan}: {warning}")
-    write_whole(target_of(spec), text.encode())
+    try:
+        content = text.encode()
+    except UnicodeEncodeError as error:
+        message = f"{scan or spec}: the name is not UTF-8, as all of a spec is; rename the file"
+        raise InputError(message) from error
+    write_whole(target_of(spec), content)
     print_text(f"{spec}: written\nnext: gfmd run {typed(spec)}")
 
 
@@ -68,6 +73,10 @@ def surface(
     from gfmd_cli.analysis.surface_summary import summarise, summary_table, summary_text
     from gfmd_cli.spec.parse import read_scan, read_spec
 
+    if figure is not None:
+        from gfmd_cli.analysis.plotting import check_figure
+
+        check_figure(figure)
     names, summaries = [], []
     for path in paths:
         if path.suffix == ".toml":

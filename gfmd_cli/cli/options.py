@@ -3,21 +3,17 @@
 import shlex
 from collections import Counter
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from gfmd_cli.errors import InputError, typed
 
-if TYPE_CHECKING:
-    from gfmd_cli.spec.models import Spec
-
-OF_OTHERS = {".csv", ".nc", ".vti", ".html", ".json", ".toml"}
-"""Suffixes of files that other commands write or read."""
-
 
 class Number(click.FloatRange):
     """A number in a range; click would take NaN."""
+
+    name = "number"
 
     def convert(
         self, value: Any, param: click.Parameter | None, ctx: click.Context | None
@@ -72,16 +68,6 @@ overrides_option = click.option(
 output_option = click.option(
     "-o", "--output", type=FILE, help="Study file; by default NAME.h5 in the working directory."
 )
-
-
-def study_path(spec: "Spec", output: Path | None) -> Path:
-    """The study file of a spec. Raises InputError for the suffix of a file of another kind."""
-    if output is not None and output.suffix.lower() in OF_OTHERS:
-        raise InputError(
-            f"-o {output}: a study is an HDF5 file, such as {output.stem}.h5; gfmd export writes "
-            "CSV, netCDF and VTK, gfmd report HTML"
-        )
-    return output or Path(f"{spec.study.name}.h5")
 
 
 def repeated(output: Path | None, overrides: tuple[str, ...]) -> list[str]:

@@ -86,8 +86,8 @@ def report(study: Path, other: Path | None, output: Path | None, bench: Path | N
     from gfmd_cli.report.page import report as page
 
     name = study.stem if other is None else f"{study.stem}-{other.stem}"
-    path = output or study.with_name(f"{name}.html")
-    if path.suffix not in (".html", ".htm"):
+    path = output or study.parent / f"{name}.html"
+    if output is not None and path.suffix not in (".html", ".htm"):
         raise InputError(f"{path}: unknown suffix {path.suffix!r}; allowed: .html, .htm")
     for source in (study, other, bench):
         if source is not None and os.path.realpath(path) == os.path.realpath(source):

@@ -1,5 +1,6 @@
 """`gfmd run`."""
 
+import re
 import sys
 from collections import Counter
 from collections.abc import Mapping
@@ -9,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from gfmd_cli.cli.messages import print_error, print_text
-from gfmd_cli.cli.options import FILE, Command, Number, output_option, overrides_option, study_path
+from gfmd_cli.cli.options import FILE, Command, Number, output_option, overrides_option
 from gfmd_cli.cli.progress import Reporter
 from gfmd_cli.errors import InputError, typed
 from gfmd_cli.status import Status, counted
@@ -24,10 +25,11 @@ def _shard(context: click.Context, parameter: click.Parameter, text: str | None)
     """ "I/N" as two numbers, 0 <= I < N."""
     if text is None:
         return 0, 1
-    index, _, count = text.partition("/")
-    if not (index.isdecimal() and count.isdecimal() and int(index) < int(count)):
+    numbers = re.fullmatch("([0-9]{1,9})/([0-9]{1,9})", text)
+    index, count = map(int, numbers.groups() if numbers else (0, 0))
+    if index >= count:
         raise InputError(f"--shard {text}: write I/N with 0 <= I < N, such as 0/8")
-    return int(index), int(count)
+    return index, count
 
 
 @click.command(cls=Command)
@@ -107,7 +109,7 @@ def run(
 
         options = RunOptions(ranks=ranks, max_seconds=max_seconds, may_exit=True, **run_options)
         read = [read_spec(spec, overrides) for spec in specs]
-        paths = [study_path(spec, output) for spec, _ in read]
+        paths = [spec.study_path(output) for spec, _ in read]
         if options.overwrite and len(set(paths)) < len(paths):
             raise InputError(
                 "--overwrite: not with several specs of one study; each would start it anew"

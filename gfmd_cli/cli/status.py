@@ -16,7 +16,6 @@ from gfmd_cli.cli.options import (
     arguments_as_given,
     output_option,
     overrides_option,
-    study_path,
 )
 from gfmd_cli.errors import InputError, typed
 from gfmd_cli.status import Status, counted
@@ -53,7 +52,7 @@ def status(
         progress, words = progress_of_study(path), arguments_as_given(Path("SPEC"), path, ())
     else:
         resolved, _ = read_spec(path, overrides)
-        progress = progress_of_spec(resolved, study_path(resolved, output))
+        progress = progress_of_spec(resolved, resolved.study_path(output))
         words = arguments_as_given(path, output, overrides)
     if shards is not None:
         check_shards(shards, len(progress.tasks))
@@ -82,7 +81,7 @@ def collect(spec: Path, output: Path | None, overrides: tuple[str, ...]) -> None
     from gfmd_cli.study.tasks import plan
 
     resolved, text = read_spec(spec, overrides)
-    study = Study(study_path(resolved, output))
+    study = Study(resolved.study_path(output))
     if study.record_paths() or study.damaged_paths():
         tasks = plan(resolved)
         with study.work(tasks) as damaged:

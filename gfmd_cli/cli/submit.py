@@ -15,7 +15,6 @@ from gfmd_cli.cli.options import (
     output_option,
     overrides_option,
     repeated,
-    study_path,
 )
 from gfmd_cli.errors import GfmdError, InputError
 from gfmd_cli.units import count
@@ -82,7 +81,7 @@ def submit(
     if shards is None and not missing:
         raise InputError("submit: give --shards N, the number of array members, or --missing")
     resolved, _ = read_spec(spec, overrides)
-    study = Path(os.path.realpath(study_path(resolved, output)))
+    study = Path(os.path.realpath(resolved.study_path(output)))
     job = batch(
         progress_of_spec(resolved, study),
         plan(resolved),

@@ -439,6 +439,10 @@ def _check_all_rows_read(file: BinaryIO, columns: int, rows: int) -> None:
     rows_above = 0
     file.seek(0)
     for number, line in enumerate(file, 1):
+        if b"\0" in line:
+            raise InputError(
+                f":{number}: zero bytes in the table: the file is damaged, or not text"
+            )
         words = line.split()
         marks = [word for word in words if not is_height(word)]
         if not marks:

@@ -27,6 +27,7 @@ PRESSURE_RANGE = (1e-30, 1e6)
 loses digits: the maximum of |K h| on N x N points is at most N times its rms value, and N <= 2^17.
 Far below the lower limit squares of p* underflow; rounding errors of sigma exceed p* much earlier.
 """
+RANGE_ROUNDING = 1e-12  # of a pressure at a limit, as the last one of a geometric sequence
 UNCERTAINTY_FACTOR = 2.0
 """Factor of the rms of min(g, sigma) below which gaps and stresses may be errors.
 
@@ -36,6 +37,12 @@ than these, and with a factor of 1 by up to 17. At n = 0.25 by up to 9.
 """
 VOID_HEIGHT = -1e30
 """Height where nothing can touch [h_std]: below all displacements, with a square in range."""
+
+
+def is_solved(p_star: float) -> bool:
+    """Whether a reduced pressure is in the range of those that are solved, up to rounding."""
+    low, high = PRESSURE_RANGE
+    return low * (1 - RANGE_ROUNDING) <= p_star <= high * (1 + RANGE_ROUNDING)
 
 
 @dataclass(frozen=True)
@@ -283,8 +290,8 @@ class Scene:
 
     def contact(self, p_star: float) -> Contact:
         """The contact at reduced pressure p*. Raises InputError where that is out of range."""
-        low, high = PRESSURE_RANGE
-        if not low <= p_star <= high:
+        if not is_solved(p_star):
+            low, high = PRESSURE_RANGE
             raise InputError(
                 f"load: p* = {p_star:g} is out of range, {low:g} to {high:g}: p* = 1 is "
                 f"{self.delta_sigma:.3g} Pa here; are moduli, heights and lengths in Pa and m?"

@@ -373,8 +373,9 @@ def _read_table(path: Path) -> Field:
     try:
         return _table(path, file_version(path))
     except (OSError, ValueError) as error:
+        reason = "not UTF-8 text" if isinstance(error, UnicodeError) else error
         raise InputError(
-            f"{path}: elastomer.path: cannot be read: {error}; the file must be a text of two "
+            f"{path}: elastomer.path: cannot be read: {reason}; the file must be a text of two "
             "columns of numbers, q [1/m] and k [Pa/m], with # before words"
         ) from error
 

@@ -45,9 +45,11 @@ from gfmd_cli.maps.noise import noise_beyond, noisy
 from gfmd_cli.maps.pictures import Picture, picture
 from gfmd_cli.maps.tip import blunted
 from gfmd_cli.maps.topography import Region, Topography, read_topography
-from gfmd_cli.physics.indenters import POINTS_ROUNDING, SMALLEST_GRID, RigidSurface
+from gfmd_cli.physics.indenters import SMALLEST_GRID, RigidSurface
 from gfmd_cli.spec_table import FilePath, Positive
 from gfmd_cli.units import count, labelled
+
+SHOWN_ROUNDING = 1e-5  # of a length that a message shows with six digits
 
 
 class FileSurface(RigidSurface):
@@ -493,20 +495,20 @@ def _filtered(surface: FileSurface) -> Field:
     heights, cutoff, spacing = _filled(surface), surface.s_filter, surface._map_spacing()
     longest = min(n * step for n, step in zip(heights.shape, spacing, strict=True))
     limit = surface.lateral_period_limit
-    if limit is not None and limit > longest / 2:
+    if limit is not None and limit > (1 + SHOWN_ROUNDING) * longest / 2:
         raise InputError(
             f"{surface.path}: surface.lateral_period_limit = {limit:g} m: the shortest "
             f"wavelength that the microscope resolves must be at most half the shorter side of the "
-            f"map, {longest / 2:.3g} m"
+            f"map, {longest / 2:g} m"
         )
     if cutoff is None:
         return heights
     shortest = MIN_SPACINGS * min(spacing)
-    if not (1 - POINTS_ROUNDING) * shortest <= cutoff <= longest:
+    if not (1 - SHOWN_ROUNDING) * shortest <= cutoff <= (1 + SHOWN_ROUNDING) * longest:
         raise InputError(
             f"{surface.path}: surface.s_filter = {cutoff:g} m: the cut-off wavelength must lie "
-            f"between {MIN_SPACINGS} spacings of the map, {shortest:.3g} m, and its shorter side, "
-            f"{longest:.3g} m"
+            f"between {MIN_SPACINGS} spacings of the map, {shortest:g} m, and its shorter side, "
+            f"{longest:g} m"
         )
     return gaussian_filter(heights, spacing, cutoff, periodic=surface._is_repeated())
 

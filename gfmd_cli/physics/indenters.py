@@ -25,6 +25,12 @@ MAX_POINTS = 2**17  # along an axis; upper limit, guards against typing errors
 MAX_ASPECT_RATIO = 1e9  # side along y over side along x; a choice: no grid has so many points
 SLOPE_STEP = 1e-3  # of a distance from the middle, over which a slope is taken
 POINTS_ROUNDING = 1e-9  # of a number of points that follows from a ratio of sides
+UNCOUNTABLE = 1e15  # points along an axis; what would need more, or infinitely many, counts as this
+
+
+def whole_points(number: float) -> int:
+    """The smallest whole number of points that is at least `number`, up to rounding."""
+    return ceil(min(number, UNCOUNTABLE) - POINTS_ROUNDING)
 
 
 class RigidSurface(SpecTable):
@@ -65,7 +71,7 @@ class RigidSurface(SpecTable):
         if self.dimension == 1:
             return 1
         length_y, length = self._checked_sides()
-        return max(SMALLEST_GRID, ceil(self.smallest_grid() * length_y / length - POINTS_ROUNDING))
+        return max(SMALLEST_GRID, whole_points(self.smallest_grid() * length_y / length))
 
     def _checked_sides(self) -> tuple[float, ...]:
         """The sides. Raises InputError where no grid has so many points along y."""
@@ -123,7 +129,10 @@ class RigidSurface(SpecTable):
         """What to do where the surface needs so many points along an axis, or more."""
         if needed <= MAX_POINTS:
             return f"use {needed} or more"
-        return f"it takes {needed}, but at most {MAX_POINTS} are allowed; check: {self.size_hint}"
+        return (
+            f"it takes {float(needed):.12g}, but at most {MAX_POINTS} are allowed; "
+            f"check: {self.size_hint}"
+        )
 
     def grid(self, points: int, points_y: int = 0) -> Grid:
         """The grid of so many points on the cell; by default with `points_y(points)` along y."""
@@ -320,7 +329,10 @@ class Punch(RoundIndenter):
     def _check_rim(self) -> None:
         side = min(self.sides)
         if self.radius >= side / 2:
-            raise ValueError(f"radius = {self.radius:g} leaves no rim in a cell of {side:g}")
+            raise ValueError(
+                f"radius = {self.radius:g} leaves no rim in a cell of {side:g}: "
+                f"less than {side / 2:g} is allowed"
+            )
 
     def on_cell(self, points: int, points_y: int) -> Self:
         """See `RigidSurface.on_cell`. Raises InputError where the radius leaves no rim."""
@@ -333,11 +345,11 @@ class Punch(RoundIndenter):
 
     def smallest_grid(self) -> int:
         """Smallest number of points along x: the radius is a spacing or more."""
-        return max(SMALLEST_GRID, ceil(self.length / self.radius - POINTS_ROUNDING))
+        return max(SMALLEST_GRID, whole_points(self.length / self.radius))
 
     def smallest_grid_y(self) -> int:
         """Smallest number of points along y, likewise."""
-        return max(SMALLEST_GRID, ceil(self.sides[0] / self.radius - POINTS_ROUNDING))
+        return max(SMALLEST_GRID, whole_points(self.sides[0] / self.radius))
 
     def smallest_grid_reason(self) -> str:
         """Reason for the smallest grid: the radius."""
@@ -368,7 +380,7 @@ class Ridge(LineIndenter):
 
     def smallest_grid(self) -> int:
         """Smallest number of points: the foot is a spacing or more away from the crest."""
-        return max(SMALLEST_GRID, ceil(2 / self.width - POINTS_ROUNDING))
+        return max(SMALLEST_GRID, whole_points(2 / self.width))
 
     def smallest_grid_reason(self) -> str:
         """Reason for the smallest grid: the width."""

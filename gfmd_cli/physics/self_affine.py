@@ -13,7 +13,7 @@ from pydantic import model_validator
 from gfmd_cli.errors import InputError
 from gfmd_cli.grid.arrays import Field, Modes
 from gfmd_cli.grid.fft_grid import Grid
-from gfmd_cli.physics.indenters import MAX_POINTS, SMALLEST_GRID, RigidSurface
+from gfmd_cli.physics.indenters import MAX_POINTS, SMALLEST_GRID, UNCOUNTABLE, RigidSurface
 from gfmd_cli.spec_table import Positive, Seed
 
 LARGEST_ROLLOFF = 1e6
@@ -62,7 +62,9 @@ class SelfAffine(RigidSurface):
         """Largest numbers of waves along the sides y and x of the cell: side / lambda_s."""
         length_y, length = self.sides
         shortest = max(self.cutoff, 1e-300) / (1 + 1e-12)  # 1/0.01: 100, not 99
-        return int(np.floor(length_y / length / shortest)), int(np.floor(1 / shortest))
+        numbers = (length_y / length / shortest, 1 / shortest)
+        along_y, along_x = (int(min(number, UNCOUNTABLE)) for number in numbers)
+        return along_y, along_x
 
     def smallest_grid(self) -> int:
         """Smallest number of points along x, two per lambda_s.
@@ -72,7 +74,7 @@ class SelfAffine(RigidSurface):
         """
         if self.rolloff > LARGEST_ROLLOFF:
             raise InputError(
-                f"surface.rolloff: {self.rolloff:g} given, out of range: it is in units of "
+                f"surface.rolloff: {self.rolloff:.12g} given, out of range: it is in units of "
                 f"surface.length, and at most {LARGEST_ROLLOFF:g}"
             )
         needed = max(SMALLEST_GRID, 2 * self.highest_modes[1])

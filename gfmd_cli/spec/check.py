@@ -3,6 +3,7 @@
 import os
 import re
 from collections.abc import Iterable, Sequence
+from datetime import date, time
 from difflib import get_close_matches
 from itertools import product
 from math import prod
@@ -26,12 +27,13 @@ WORDS = {
     "digits, '.', '_' and '-', at most 100 of them",
     "path_type": "must be the name of a file",
     "model_type": "must be a table",
+    "bool_type": "must be true or false",
     "too_short": "must have {min_length} or more values",
     "too_long": "must have at most {max_length} values",
 }
 """What is allowed, by the type of pydantic's error, where its message is not plain."""
-ESCAPED = re.compile(r"[\b\t\n\f\r]")
-"""Characters that a backslash and a letter stand for in TOML, and that are rare in a path."""
+ESCAPED = re.compile(r"[\0\b\t\n\f\r]")
+"""Characters that TOML writes with a backslash, and that are rare in a path, or not allowed."""
 BACKSLASH = (
     "a backslash begins an escape such as \\n; write paths in single quotes or with forward slashes"
 )
@@ -142,7 +144,7 @@ class Check:
             if isinstance(table, dict):
                 entries += self._build(name, table, paired)
             else:
-                self.add(name, f"must be a table, got {shortened(repr(table))}")
+                self.add(name, f"must be a table, got {_shown(table)}")
         return list(dict.fromkeys(entries)) if name in models.SWEPT else entries
 
     def _build(
@@ -161,11 +163,11 @@ class Check:
             places = {key: i for keys, i in zip(axes, indices, strict=True) for key in keys}
             values = table | {key: table[key][i] for key, i in places.items()}
             path = values.get("path")
-            if isinstance(path, str) and "\0" not in path:
-                values = values | {"path": os.path.realpath(self.folder / path)}
-                if ESCAPED.search(path) and not os.path.exists(values["path"]):
+            if isinstance(path, str):
+                if ESCAPED.search(path) and not os.path.exists(self.folder / path):
                     self.add(f"{name}.path", f"no such file {shortened(repr(path))}: {BACKSLASH}")
                     continue
+                values = values | {"path": os.path.realpath(self.folder / path)}
             if name in DEFAULT_KINDS:
                 values = {"kind": DEFAULT_KINDS[name]} | values
             try:
@@ -294,7 +296,7 @@ def _refusal(detail: Any) -> str:
         message = WORDS[error].format(**detail.get("ctx", {}))
     if error == "value_error" and isinstance(given, dict):  # of a whole table
         return str(message)
-    text = f"{message}, got {shortened(repr(given))}"
+    text = f"{message}, got {_shown(given)}"
     if isinstance(given, str) and NUMBER.fullmatch(given):
         text += ": write a number as TOML has it, such as 1.0 or 10, without quotation marks"
     return text
@@ -314,6 +316,13 @@ def _unknown(given: str, known: Iterable[str], what: str) -> str:
     matches = get_close_matches(meant, related or known, 1, 0.0 if related else 0.6)
     hint = f" - did you mean {matches[0]!r}?" if matches else ""
     return f"unknown {what} {shortened(given)!r}{hint} (known: {', '.join(known)})"
+
+
+def _shown(given: Any) -> str:
+    """A value in a message; truth values and dates as TOML has them."""
+    if isinstance(given, bool):
+        return str(given).lower()
+    return str(given) if isinstance(given, date | time) else shortened(repr(given))
 
 
 def shortened(text: str, limit: int = MAX_SHOWN) -> str:

@@ -4,6 +4,7 @@ from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from itertools import product
 from math import prod
+from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple, Self, TypeVar, get_args
 
 import numpy as np
@@ -12,7 +13,7 @@ from pydantic import Field as Key
 
 from gfmd_cli.errors import InputError
 from gfmd_cli.files.checksums import file_digest
-from gfmd_cli.physics.contact import PRESSURE_RANGE
+from gfmd_cli.physics.contact import PRESSURE_RANGE, is_solved
 from gfmd_cli.physics.elastomers import Elastomer
 from gfmd_cli.physics.indenters import MAX_POINTS, SMALLEST_GRID, RigidSurface
 from gfmd_cli.physics.linear_elastomer import LinearElastomer
@@ -23,6 +24,8 @@ from gfmd_cli.spec_table import Positive, SpecTable
 MAX_VALUES = 100_000  # of one list or ladder; upper limit, guards against typing errors
 MAX_DECADES = 300.0  # of which a power of ten does not overflow
 LADDER_ROUNDINGS = 8  # of a power of ten, by which a value of the ladder may lie above `to`
+OF_OTHERS = {".csv", ".nc", ".vti", ".html", ".json", ".toml"}
+"""Suffixes of files that other commands write or read."""
 SWEPT = ("surface", "elastomer", "grid", "solver")
 REPEATED = (*SWEPT, "sweep")  # tables that may be given several times
 
@@ -114,7 +117,7 @@ class Ladder(SpecTable):
     @model_validator(mode="after")
     def _rises(self) -> Self:
         if self.to < self.from_:
-            raise ValueError(f"to = {self.to:g} lies below from = {self.from_:g}")
+            raise ValueError(f"to = {self.to:.12g} lies below from = {self.from_:.12g}")
         if (count := int(self._decades * self.per_decade) + 1) > MAX_VALUES:
             raise ValueError(f"a sequence of {count} values; at most {MAX_VALUES} are allowed")
         return self
@@ -219,8 +222,8 @@ class LoadTable(SpecTable):
             raise ValueError(f"give one of {', '.join(LOADS)}")
         if self.p_star is not None:
             low, high = PRESSURE_RANGE
-            if beyond := [p for p in self.listed() if not low <= p <= high]:
-                raise ValueError(f"p_star must be from {low:g} to {high:g}, got {beyond[0]:g}")
+            if beyond := [p for p in self.listed() if not is_solved(p)]:
+                raise ValueError(f"p_star must be from {low:g} to {high:g}, got {beyond[0]:.12g}")
         if "tolerance" in self.model_fields_set and not LOADS[loads[0]].searched:
             searched = [name for name, load in LOADS.items() if load.searched]
             raise ValueError(f"tolerance belongs to {' or '.join(searched)}")
@@ -348,6 +351,15 @@ class Spec(SpecTable):
     places: dict[str, list[tuple[int | None, ...]]]
     """Where each entry of a table, and each load, stands in each group of paired lists; None where
     the table has no list of the pair."""
+
+    def study_path(self, output: Path | None = None) -> Path:
+        """The study file, or `output`. Raises InputError for a suffix of files of another kind."""
+        if output is not None and output.suffix.lower() in OF_OTHERS:
+            raise InputError(
+                f"{output}: a study is an HDF5 file, such as {output.stem}.h5; gfmd export writes "
+                "CSV, netCDF and VTK, gfmd report HTML"
+            )
+        return output or Path(f"{self.study.name}.h5")
 
     def combinations(self) -> Iterator[tuple[dict[str, int], list[float]]]:
         """The entries of the swept tables that go together, by table, and their loads."""

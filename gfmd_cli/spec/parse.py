@@ -144,10 +144,13 @@ def split_override(override: str) -> tuple[list[str], Any]:
     if len(parts) > MAX_DEPTH:
         raise InputError(f"--set {shortened(key)}: nested deeper than {MAX_DEPTH}")
     try:
-        return parts, _toml(f"value = {value.strip()}", f"--set {key}")["value"]
-    except InputError:
+        (parsed,) = _toml(f"value = {value.strip()}", f"--set {key}").values()
+        return parts, parsed
+    except (InputError, ValueError):  # ValueError: further lines set further keys
         if not re.fullmatch(r"[\w./~+\-]+", value.strip()):
-            raise InputError(f"--set {override}: {value!r} is not a TOML value") from None
+            raise InputError(
+                f"--set {override}: {value!r} is not a TOML value, such as 0.1, [0.1, 0.2] or true"
+            ) from None
         return parts, value.strip()  # a bare word is a string
 
 

@@ -228,7 +228,8 @@ def damage_named(source: Path) -> Iterator[None]:
     try:
         yield
     except DAMAGE as error:
-        raise StudyError(f"{source}: not a readable study, or damaged: {error}") from error
+        reason = getattr(error, "strerror", None) or error
+        raise StudyError(f"{source}: not a readable study, or damaged: {reason}") from error
 
 
 @contextmanager

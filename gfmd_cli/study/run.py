@@ -53,8 +53,6 @@ class RunOptions:
     """Whether a second SIGINT ends the process at once; otherwise it raises KeyboardInterrupt."""
 
     def __post_init__(self) -> None:
-        if self.jobs is not None and self.jobs < 1:
-            raise InputError(f"--jobs {self.jobs}: at least 1 worker process is needed")
         if self.overwrite and self.shard[1] != 1:
             raise InputError("--overwrite: not with --shard; each shard would start a new study")
 
