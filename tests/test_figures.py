@@ -369,6 +369,13 @@ def test_entries_that_curves_share_follow_the_curves(study):
     assert entries == ["n = 0, 2 seeds", "n = 1, 2 seeds", "Persson theory", "95 % confidence"]
 
 
+def test_the_legend_says_of_how_many_seeds_the_points_are_means(study):
+    study(ROUGH, "surface.seed=[0, 1, 2]", "load.p_star=0.1", "output.histogram=false")
+    study(ROUGH, "surface.seed=[0, 1]", "load.p_star=0.3", "output.histogram=false")
+    comparison = study(ROUGH, "surface.seed=0", "load.p_star=1", "output.histogram=false")
+    assert "n = 1, 1 to 3 seeds" in figure_of("contact_area", comparison).entries
+
+
 def test_a_folder_that_cannot_be_written_is_told(study, tmp_path):
     comparison = study(ROUGH, "elastomer.n=1", "load.p_star=0.3")
     (tmp_path / "taken").write_text("a file")
