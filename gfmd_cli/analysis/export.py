@@ -130,7 +130,7 @@ def _labelled_study(path: Path) -> Any:
     with open_study(path) as study:
         rows = study.rows
         variables = {c.name: _of_tasks(rows, c) for c in (*study.columns, layout.SCENE)}
-        coordinates: dict[str, Any] = {"task": _of_tasks(rows, layout.TASK)[1]}
+        coordinates: dict[str, Any] = {"task": _of_tasks(rows, layout.TASK)}
         coordinates |= {name: variables.pop(name) for name in COORDINATES if name in variables}
         for bins in layout.HISTOGRAMS:
             if rows and bins.name in rows[0]:
