@@ -353,6 +353,26 @@ def test_a_step_across_the_border_matters_only_where_the_map_is_repeated():
 
 
 @pytest.mark.parametrize(
+    ("keys", "remedy"),
+    [
+        ({}, "set surface.periodic = false"),
+        ({"edges": "none"}, "set surface.periodic = false and leave out surface.edges"),
+        ({"edges": "none", "periodic": False, "level": "none"}, "leave out surface.edges"),
+    ],
+)
+def test_the_warning_of_a_step_at_the_border_asks_for_what_the_spec_does_not_say(keys, remedy):
+    ramp = np.linspace(0, 1e-8, 32) + np.random.default_rng(0).normal(0, 1e-11, (32, 32))
+    tables = {
+        "surface": {"length": 1e-5, **keys},
+        "elastomer": {"kind": "half-space", "E_star": 1e9},
+        "grid": {"boundary": "periodic"},
+        "load": {"p_star": 1.0},
+    }
+    (warning,) = (each for each in solve(tables, heights=ramp).warnings if "the border" in each)
+    assert warning.endswith(f"if the map is not periodic, {remedy}")
+
+
+@pytest.mark.parametrize(
     ("tilt", "keys", "warned"),
     [
         *((1.0, {}, True), (1.0, {"level": "plane"}, False), (1.0, {"periodic": False}, False)),
