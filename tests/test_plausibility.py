@@ -420,6 +420,19 @@ def test_a_rough_surface_has_it(tmp_path):
     assert as_records(comparison)[0]["a_r_persson"] > 0
 
 
+def test_records_of_springs_have_the_closed_form_that_the_tables_show(tmp_path):
+    """Paper Eqs. (34)-(38): at p* = 1 / sqrt(2 pi) half of a Gaussian surface touches."""
+    p_star = 1 / np.sqrt(2 * np.pi)
+    spec = tables(elastomer={"kind": "power", "n": [0, 1]}, p_star=[p_star])
+    comparison = compare(run(spec, tmp_path / "a.h5"))
+    springs, half_space = as_records(comparison)
+    names = ("a_r", "sigma_p", "u_g")
+    closed_form = [springs[f"{name}_einstein"] for name in names]
+    assert closed_form == pytest.approx([0.5, np.sqrt(0.5 - p_star**2), p_star])
+    assert "closed form" in str(comparison)
+    assert not half_space.keys() & {f"{name}_einstein" for name in names}
+
+
 @pytest.mark.parametrize(
     ("poisson", "points", "boundary", "warned"),
     [
