@@ -375,6 +375,16 @@ def test_entries_that_curves_share_follow_the_curves(study):
     assert entries == ["n = 0, 2 seeds", "n = 1, 2 seeds", "Persson theory", "95 % confidence"]
 
 
+def test_figures_name_a_solver_as_the_tables_do(study):
+    """With "auto", the solver that was used is not what sets the curves apart."""
+    keys = ("elastomer.n=1", "load.p_star=0.3", "output.histogram=false")
+    comparison = study(ROUGH, *keys, 'solver.kind=["auto", "pcg", "ccg"]')
+    kinds = ["auto", "pcg", "ccg"]
+    labels = [style.label for style in curve_styles(comparison.curves)]
+    assert labels == [f"n = 1, {kind}" for kind in kinds]
+    assert all(f"points a side, {kind}\n" in str(comparison) for kind in kinds)
+
+
 def test_the_legend_says_of_how_many_seeds_the_points_are_means(study):
     study(ROUGH, "surface.seed=[0, 1, 2]", "load.p_star=0.1", "output.histogram=false")
     study(ROUGH, "surface.seed=[0, 1]", "load.p_star=0.3", "output.histogram=false")
