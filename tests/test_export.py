@@ -11,7 +11,7 @@ import pytest
 import xarray
 
 from gfmd_cli.analysis.export import _cell, _padded, as_dataset
-from gfmd_cli.study.columns import COLUMNS, CONTRACT, DETAILS
+from gfmd_cli.study.columns import COLUMNS, CONTRACT, DETAILS, TASK
 from gfmd_cli.study.reading import open_study, read_rows
 
 SPEC = """
@@ -83,7 +83,7 @@ def test_csv_has_the_columns_of_the_layout(output_of, study, tmp_path):
 def test_a_dataset_has_columns_distributions_scenes_and_curves(study):
     dataset, rows = as_dataset(study), read_rows(study)
     assert {c.name for c in (*CONTRACT, *DETAILS)} <= {*dataset.variables}
-    for column in (c for c in COLUMNS if c.name in dataset.variables):
+    for column in (c for c in (TASK, *COLUMNS) if c.name in dataset.variables):
         variable = dataset[column.name]
         np.testing.assert_array_equal(variable.values, [row[column.name] for row in rows])
         assert variable.dims == ("task",)

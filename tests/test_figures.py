@@ -8,7 +8,13 @@ from specs import power_spec
 
 from gfmd_cli.analysis import figures
 from gfmd_cli.analysis.compare import Curve, compare
-from gfmd_cli.analysis.curve_styles import MAX_LABEL, colours, curve_styles, distinct_labels
+from gfmd_cli.analysis.curve_styles import (
+    MAX_LABEL,
+    colours,
+    curve_styles,
+    distinct_labels,
+    distinct_styles,
+)
 from gfmd_cli.analysis.figures import PANELS, draw_all, study_figures, with_styles
 from gfmd_cli.analysis.plotting import ColumnFigure, styled
 from gfmd_cli.errors import InputError, SpaceError
@@ -367,6 +373,36 @@ def test_entries_that_curves_share_follow_the_curves(study):
     seeds = ("surface.seed=[0, 1]", "load.p_star=[0.1, 0.3]", "output.histogram=false")
     entries = [*figure_of("contact_area", study(ROUGH, *seeds)).entries]
     assert entries == ["n = 0, 2 seeds", "n = 1, 2 seeds", "Persson theory", "95 % confidence"]
+
+
+def test_figures_name_a_solver_as_the_tables_do(study):
+    """With "auto", the solver that was used is not what sets the curves apart."""
+    keys = ("elastomer.n=1", "load.p_star=0.3", "output.histogram=false")
+    comparison = study(ROUGH, *keys, 'solver.kind=["auto", "pcg", "ccg"]')
+    kinds = ["auto", "pcg", "ccg"]
+    labels = [style.label for style in curve_styles(comparison.curves)]
+    assert labels == [f"n = 1, {kind}" for kind in kinds]
+    assert all(f"points a side, {kind}\n" in str(comparison) for kind in kinds)
+
+
+def test_the_legend_says_of_how_many_seeds_the_points_are_means(study):
+    study(ROUGH, "surface.seed=[0, 1, 2]", "load.p_star=0.1", "output.histogram=false")
+    study(ROUGH, "surface.seed=[0, 1]", "load.p_star=0.3", "output.histogram=false")
+    comparison = study(ROUGH, "surface.seed=0", "load.p_star=1", "output.histogram=false")
+    assert "n = 1, 1 to 3 seeds" in figure_of("contact_area", comparison).entries
+
+
+def test_a_legend_is_no_wider_than_its_figure():
+    """A label of the largest length, and the number of seeds after it."""
+    (style,) = distinct_styles(["half-space hurst=0.8 " + "x" * (MAX_LABEL - 21)])
+    with styled():
+        plot = ColumnFigure("x", "y")
+        plot.points(replace(style, label=f"{style.label}, 10 to 12 seeds"), *np.ones((2, 1)))
+        plot.svg()
+        (legend,) = plot.figure.legends
+        assert legend.get_window_extent().width <= plot.figure.bbox.width
+        (text,) = legend.get_texts()
+        assert text.get_text().replace("\n", " ") == f"{style.label}, 10 to 12 seeds"
 
 
 def test_a_folder_that_cannot_be_written_is_told(study, tmp_path):

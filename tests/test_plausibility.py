@@ -353,6 +353,26 @@ def test_a_step_across_the_border_matters_only_where_the_map_is_repeated():
 
 
 @pytest.mark.parametrize(
+    ("keys", "remedy"),
+    [
+        ({}, "set surface.periodic = false"),
+        ({"edges": "none"}, "set surface.periodic = false and leave out surface.edges"),
+        ({"edges": "none", "periodic": False, "level": "none"}, "leave out surface.edges"),
+    ],
+)
+def test_the_warning_of_a_step_at_the_border_asks_for_what_the_spec_does_not_say(keys, remedy):
+    ramp = np.linspace(0, 1e-8, 32) + np.random.default_rng(0).normal(0, 1e-11, (32, 32))
+    tables = {
+        "surface": {"length": 1e-5, **keys},
+        "elastomer": {"kind": "half-space", "E_star": 1e9},
+        "grid": {"boundary": "periodic"},
+        "load": {"p_star": 1.0},
+    }
+    (warning,) = (each for each in solve(tables, heights=ramp).warnings if "the border" in each)
+    assert warning.endswith(f"if the map is not periodic, {remedy}")
+
+
+@pytest.mark.parametrize(
     ("tilt", "keys", "warned"),
     [
         *((1.0, {}, True), (1.0, {"level": "plane"}, False), (1.0, {"periodic": False}, False)),
@@ -398,6 +418,19 @@ def test_a_rough_surface_has_it(tmp_path):
     assert comparison.has_theory
     assert "Persson" in str(comparison)
     assert as_records(comparison)[0]["a_r_persson"] > 0
+
+
+def test_records_of_springs_have_the_closed_form_that_the_tables_show(tmp_path):
+    """Paper Eqs. (34)-(38): at p* = 1 / sqrt(2 pi) half of a Gaussian surface touches."""
+    p_star = 1 / np.sqrt(2 * np.pi)
+    spec = tables(elastomer={"kind": "power", "n": [0, 1]}, p_star=[p_star])
+    comparison = compare(run(spec, tmp_path / "a.h5"))
+    springs, half_space = as_records(comparison)
+    names = ("a_r", "sigma_p", "u_g")
+    closed_form = [springs[f"{name}_einstein"] for name in names]
+    assert closed_form == pytest.approx([0.5, np.sqrt(0.5 - p_star**2), p_star])
+    assert "closed form" in str(comparison)
+    assert not half_space.keys() & {f"{name}_einstein" for name in names}
 
 
 @pytest.mark.parametrize(

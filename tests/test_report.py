@@ -510,6 +510,15 @@ def test_only_rough_surfaces_have_a_spectrum(invoke, tmp_path, whole):
     assert anchor not in report(solved(invoke, tmp_path, LINE))
 
 
+def test_a_page_of_an_indenter_names_no_theory(invoke, tmp_path):
+    text = ONE.replace('kind = "self-affine"\ncutoff = 0.1', 'kind = "parabola"')
+    page = report(solved(invoke, tmp_path, text, "--set", "output.true_contact=true"))
+    captions = re.findall("<(?:caption|summary|figcaption).*?</", page, flags=re.DOTALL)
+    assert any("Middle of each bin" in caption for caption in captions)
+    assert any("taken over the true contact" in caption for caption in captions)
+    assert not any("heory" in caption for caption in captions)
+
+
 def test_spectra_of_lines_and_of_areas_have_their_own_units(invoke, tmp_path):
     """C(q) of a profile is in m^3, that of a map in m^4."""
     rng = np.random.default_rng(0)

@@ -233,5 +233,5 @@ def _words(curve: Curve) -> dict[str, str]:
     size = points_text(int(row["points"]), int(row["points_y"]))
     points = "" if row["grid"] == "auto" else f"{size} points"
     checksum = "".join(curve.surface.partition(FILE_MARK)[1:]).strip()
-    others = {"checksum": checksum, "solver_kind": row["solver"], "points": points, "points_y": ""}
+    others = {"checksum": checksum, "points": points, "points_y": ""}
     return {"study": curve.study} | words | others

@@ -27,6 +27,7 @@ from gfmd_cli.study.reading import StudyFile, open_study, read_rows, solved_rows
 FORMULA = ("=", "+", "-", "@", "\t", "\r")
 """Characters with which a formula of a spreadsheet begins."""
 THEORY_COLUMNS = (*(f"{name}_persson" for name in QUANTITIES), "p_star_persson_at_u_g")
+EINSTEIN_COLUMNS = tuple(f"{name}_einstein" for name in QUANTITIES)
 _PARAMETER_NAMES = (each.column.name for each in layout.PARAMETERS)
 COORDINATES = tuple(dict.fromkeys(("surface", "elastomer", *_PARAMETER_NAMES, "p_star")))
 """Columns that are coordinates of the data set: labels, parameters and the reduced pressure."""
@@ -74,8 +75,9 @@ def as_records(comparison: Comparison) -> list[dict[str, Any]]:
     names = column_names(comparison.records)
     for curve in comparison.curves:
         keys = [*names, *(THEORY_COLUMNS if curve.has_theory else ())]
-        if curve.stores(VARIANTS.values()):
-            keys += VARIANTS.values()
+        for optional in (EINSTEIN_COLUMNS, VARIANTS.values()):
+            if curve.stores(optional):
+                keys += optional
         for row in curve.records:
             record = {key: plain(row[key]) for key in keys}
             records.append(record | means.get(row["task"], {}))
@@ -130,7 +132,7 @@ def _labelled_study(path: Path) -> Any:
     with open_study(path) as study:
         rows = study.rows
         variables = {c.name: _of_tasks(rows, c) for c in (*study.columns, layout.SCENE)}
-        coordinates: dict[str, Any] = {"task": _of_tasks(rows, layout.TASK)[1]}
+        coordinates: dict[str, Any] = {"task": _of_tasks(rows, layout.TASK)}
         coordinates |= {name: variables.pop(name) for name in COORDINATES if name in variables}
         for bins in layout.HISTOGRAMS:
             if rows and bins.name in rows[0]:

@@ -21,7 +21,7 @@ from gfmd_cli.files.atomic import make_folder
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.status import Status, worst
 from gfmd_cli.study.column import Row
-from gfmd_cli.units import scaled
+from gfmd_cli.units import count, scaled
 
 LOWEST = 1e-3  # of a mean: lower end of its band on a logarithmic axis
 MAX_BAR = 0.5  # of its value; the limits of an axis hold error bars up to this length
@@ -95,7 +95,9 @@ class Series:
         details = list(map(_details, compress(loads, visible)))
         style = items[0].style
         if len(items) > 1:
-            style = replace(style, label=f"{style.label}, {len(items)} seeds")
+            sizes = [len(seeds) for seeds in loads]  # they differ in an unfinished study
+            few = f"{min(sizes)} to " if min(sizes) < max(sizes) else ""
+            style = replace(style, label=f"{style.label}, {few}{count(max(sizes), 'seed')}")
         theory = np.mean([getattr(item.theory, panel.column) for item in items], axis=0)
         x, y, error, half_width = (column[visible] for column in columns)
         visible_statuses = list(compress(statuses, visible))

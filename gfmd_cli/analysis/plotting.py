@@ -7,6 +7,7 @@ from functools import partial
 from io import BytesIO
 from itertools import compress
 from pathlib import Path
+from textwrap import fill
 from typing import Any, Literal
 
 import numpy as np
@@ -139,13 +140,17 @@ class LegendFigure:
         entries = self.named_entries
         if not entries:
             return
-        columns, rows = _legend_shape(list(entries), self.width / WIDTH)
-        rows += bool(self.heading)
+        wide = self.width / WIDTH
+        longest = int(COLUMN * wide) - SYMBOL
+        texts = [fill(text, longest, break_on_hyphens=False) for text in (self.heading, *entries)]
+        heading, *labels = texts
+        columns, rows = _legend_shape(labels, wide)
+        rows += "".join(texts).count("\n") + bool(heading)
         self.figure.set_size_inches(self.width, self.height + ROW * rows)
         self.figure.legend(
             entries.values(),
-            entries.keys(),
-            title=self.heading or None,
+            labels,
+            title=heading or None,
             title_fontsize=SMALL,
             alignment="left",
             loc="outside upper center",

@@ -17,7 +17,6 @@ from gfmd_cli.analysis.distribution import StressDistribution, distributions
 from gfmd_cli.analysis.edge_law import fit_power_law
 from gfmd_cli.analysis.ensemble import ensembles
 from gfmd_cli.analysis.table import (
-    BLANK,
     Group,
     Record,
     Table,
@@ -143,7 +142,7 @@ POWER_LAWS = (
 POWER_LAWS_CAPTION = (
     "Power laws of Pr(sigma) in the continuum. exponent: fit between the two stresses; at the "
     "edge: fit with the first correction to the power law; theory: exponent at the edge of a "
-    f"contact, n{SPACE}/{SPACE}(2{SPACE}-{SPACE}n)."
+    f"contact, n{SPACE}/{SPACE}(2{SPACE}-{SPACE}n). a_r: on the finest grid, mean over the seeds."
 )
 
 
@@ -287,7 +286,7 @@ def seeds_table(comparison: Comparison) -> Table:
         for name in QUANTITIES
     )
     if not all(map(known, means_shown)):
-        caption += f" {BLANK}: the continuum value of some seed is unknown."
+        caption += " A mean is left out where the continuum value of some seed is unknown."
     return Table(caption, SEEDS, groups)
 
 

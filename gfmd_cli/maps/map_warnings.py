@@ -171,8 +171,8 @@ def unresolved(factor: float, period_limit: float = 0.0) -> str:
     )
 
 
-def step_at_border(heights: Field, *, is_tapered: bool) -> str:
-    """Warn if opposite borders of a repeated map do not fit."""
+def step_at_border(heights: Field, remedy: str) -> str:
+    """Warn if opposite borders of a repeated map do not fit; `remedy` says what to change."""
     axes = range(heights.ndim)
     ends = [np.ravel(heights.take(0, axis) - heights.take(-1, axis)) for axis in axes]
     inside = np.mean([np.mean(np.diff(heights, axis=axis) ** 2) for axis in axes])
@@ -180,9 +180,6 @@ def step_at_border(heights: Field, *, is_tapered: bool) -> str:
     limit = np.sqrt(BORDER_SHARE * max(heights.shape))  # one of so many steps is at the border
     if cliff <= np.clip(limit, MIN_BORDER_STEP, MAX_BORDER_STEP):
         return ""
-    remedy = "if the map is not periodic, set surface.periodic = false"
-    if is_tapered:
-        remedy = "the tapered zone is too narrow; raise surface.taper"
     return f"the height step across the border is {cliff:.3g} times that inside the map: {remedy}"
 
 

@@ -406,11 +406,18 @@ class FileSurface(RigidSurface):
             if not self._is_repeated():
                 warnings.append(map_warnings.missing_ends(topography))
         if boundary == "periodic" and not self.has_borders:
-            is_tapered = self.edges == "window"
-            warnings.append(map_warnings.step_at_border(heights, is_tapered=is_tapered))
+            warnings.append(map_warnings.step_at_border(heights, self._remedy_of_step()))
         if boundary == "free" and self.levelling() == "none":
             warnings.append(map_warnings.tilted(heights))
         return list(filter(None, warnings))
+
+    def _remedy_of_step(self) -> str:
+        """What to change where opposite borders of a repeated map do not fit."""
+        if self.edges == "window":
+            return "the tapered zone is too narrow; raise surface.taper"
+        changes = ["set surface.periodic = false"] if self._is_periodic() else []
+        changes += ["leave out surface.edges"] if self.edges == "none" else []
+        return f"if the map is not periodic, {' and '.join(changes)}"
 
     def _warnings_on_sides(self) -> list[str]:
         """Warnings about the sides, one of them at most for each."""

@@ -14,7 +14,7 @@ from gfmd_cli.analysis.curve_styles import rgb
 from gfmd_cli.analysis.plotting import HEIGHT, WIDTH, ColumnFigure, LegendFigure, shades
 from gfmd_cli.analysis.selection import evenly, grouped
 from gfmd_cli.analysis.table import Group, Table
-from gfmd_cli.analysis.tables import AREA, ELASTOMER, P_STAR, POINTS, PRESSURE, TASK
+from gfmd_cli.analysis.tables import AREA, ELASTOMER, ON_GRIDS, P_STAR, POINTS, PRESSURE, TASK
 from gfmd_cli.analysis.wording import (
     contact_and_boundary,
     in_si,
@@ -43,7 +43,7 @@ COLOURS, FAINTEST = "viridis", 0.3
 NONE, BEYOND = "black", "#cc3311"
 PERCENTILE = 99  # of the stress in contact and of the gap elsewhere: the end of the colour scale
 STORED = ("fields", "cross_sections")
-CAPTION = "The values are in /fields/TASK and /cross_sections/TASK of the study file."
+CAPTION = f"{ON_GRIDS} Fields: /fields/TASK and /cross_sections/TASK of the study file."
 SHOWN = (TASK, ELASTOMER, P_STAR, PRESSURE, AREA, POINTS)
 LINES = {
     "height": ("indenter h", {"color": "black", "lw": 1.2}),

@@ -46,7 +46,7 @@ EXPLANATION = (
 )
 LINES = " Lines: Persson theory with the same spectrum."
 BEHIND = "Table behind the figures"
-TRUE_CONTACT = "Table: Persson theory with the stress over the true contact"
+TRUE_CONTACT = "Table: rms stress in full contact, taken over the true contact"
 DISTRIBUTIONS = {
     "stress_distribution": (
         "Distribution of the stress over logarithmic stress, elastomers side by side",
@@ -120,10 +120,10 @@ def _over_pressure(data: ReportData, title: str, name: str, caption: str) -> Sec
 def stress_distribution(data: ReportData) -> Section:
     """Figures of Pr(sigma), the bins behind them, and power laws."""
     lines, thin = "; lines: Persson theory", "; thin: Persson theory"
-    if not data.comparison.has_theory:
-        lines, thin = "", ""
-    bins = shown(BINS, data.solved)
     of_bins = "Middle of each bin, density and theory."
+    if not data.comparison.has_theory:
+        lines, thin, of_bins = "", "", "Middle of each bin, and density."
+    bins = shown(BINS, data.solved)
     behind = {
         name: Table(of_bins, bins, [_bins(density) for density in contacts])
         for name, contacts in densities(data.items).items()
