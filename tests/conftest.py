@@ -63,6 +63,17 @@ def plans_of_the_tests(tmp_path_factory):
         yield
 
 
+@pytest.fixture(scope="module")
+def estimated_plans():
+    """Plans that are not measured: the same in all studies, and at once, also of large grids.
+
+    For modules that test no plans, and whose tests would spend most of their time on measuring.
+    """
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("GFMD_PLANS", "estimated")
+        yield
+
+
 @pytest.fixture
 def springs(tmp_path):
     """spec.toml in tmp_path, of two contacts that take no time to solve."""

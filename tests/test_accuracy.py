@@ -1,6 +1,7 @@
 """Errors of a study: "auto" grids, error bounds, spreads over seeds."""
 
 import json
+from functools import cache
 
 import numpy as np
 import pytest
@@ -392,20 +393,23 @@ def test_the_forecast_of_grids_is_right_within_a_factor_of_four(spec_of, rows_of
 # --- error bounds ---------------------------------------------------------------------------------
 
 
+@cache
+def solved_to(tolerance, elastomer, p_star):
+    """A contact, its solution and its observables."""
+    contact = build_scene(SelfAffine(cutoff=0.04), elastomer, 128).contact(p_star)
+    solution = solve_contact(contact, Auto(tolerance=tolerance))
+    contact.recompute(solution.u, solution.sigma)
+    return contact, solution, observe(contact, solution.u, solution.sigma)
+
+
 @pytest.mark.parametrize("tolerance", [1e-2, 1e-4, 1e-6])
 @pytest.mark.parametrize("p_star", [0.003, 0.1, 1.0, 3.0])
 @pytest.mark.parametrize(
     "elastomer", [Power(n=0.5), Power(n=1), Power(n=2), Power(n=4), Slab(thickness=0.02)]
 )
 def test_the_bounds_hold_the_distance_to_the_solution(elastomer, p_star, tolerance):
-    contact = build_scene(SelfAffine(cutoff=0.04), elastomer, 128).contact(p_star)
-
-    def solved(tolerance):
-        solution = solve_contact(contact, Auto(tolerance=tolerance))
-        contact.recompute(solution.u, solution.sigma)
-        return solution, observe(contact, solution.u, solution.sigma)
-
-    (_, exact), (approximate, observables) = solved(1e-11), solved(tolerance)
+    *_, exact = solved_to(1e-11, elastomer, p_star)
+    contact, approximate, observables = solved_to(tolerance, elastomer, p_star)
     bounds = error_bounds(contact, approximate.u, approximate.sigma)
     assert abs(observables.u_g - exact.u_g) <= bounds.u_g
     assert abs(observables.sigma_p - exact.sigma_p) <= bounds.sigma_p

@@ -13,6 +13,7 @@ from gfmd_cli.physics.highest_point import highest_point, highest_point_of_mirro
 from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.study import load_search
 
+pytestmark = pytest.mark.usefixtures("estimated_plans")
 SPEC = """\
 [surface]
 kind = "parabola"

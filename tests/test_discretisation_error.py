@@ -34,6 +34,7 @@ from gfmd_cli.solvers.auto import Auto
 from gfmd_cli.solvers.nested_grids import solve_contact
 from gfmd_cli.study.refinement import has_coarser_grid, scales_of
 
+pytestmark = pytest.mark.usefixtures("estimated_plans")
 ROUGH = RoughnessScales(waves=20.0, curvature=2e3)
 GRIDS = (64, 128, 256)
 

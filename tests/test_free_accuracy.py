@@ -1,5 +1,7 @@
 """Errors of contacts with a free boundary: bounds on a grid, bars from two grids, auto grids."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 from free_contacts import ELASTOMERS, compliance_matrix, oblong_contact
@@ -59,18 +61,21 @@ mean_gap = 0.1
 # --- bounds on a grid -----------------------------------------------------------------------------
 
 
+@cache
+def solved_to(tolerance, elastomer, pressure, void):
+    """A contact, its solution and its observables."""
+    contact = oblong_contact(elastomer, pressure, void=void)
+    solution = solve_contact(contact, Auto(tolerance=tolerance, nested=False))
+    return contact, solution, observe(contact, solution.u, solution.sigma)
+
+
 @pytest.mark.parametrize("tolerance", [1e-2, 1e-4])
 @pytest.mark.parametrize("pressure", [0.01, 0.3])
 @pytest.mark.parametrize("void", [False, True])
 @pytest.mark.parametrize("elastomer", ELASTOMERS, ids=lambda elastomer: elastomer.label)
 def test_the_bounds_hold_the_distance_to_the_solution(elastomer, void, pressure, tolerance):
-    contact = oblong_contact(elastomer, pressure, void=void)
-
-    def solved(tolerance):
-        solution = solve_contact(contact, Auto(tolerance=tolerance, nested=False))
-        return solution, observe(contact, solution.u, solution.sigma)
-
-    (_, exact), (approximate, inexact) = solved(1e-11), solved(tolerance)
+    *_, exact = solved_to(1e-11, elastomer, pressure, void)
+    contact, approximate, inexact = solved_to(tolerance, elastomer, pressure, void)
     bounds = error_bounds(contact, approximate.u, approximate.sigma)
     rounding = 1e-9
     assert abs(inexact.u_g - exact.u_g) <= bounds.u_g + rounding

@@ -27,6 +27,7 @@ from gfmd_cli.solvers.loop import solve
 from gfmd_cli.solvers.nested_grids import Resume, solve_contact
 from gfmd_cli.study.observables import SolvedContact
 
+pytestmark = pytest.mark.usefixtures("estimated_plans")
 ROUGH = SelfAffine(cutoff=0.05)
 SPEC = free_contacts.SPEC
 

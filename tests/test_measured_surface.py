@@ -9,6 +9,7 @@ from gfmd_cli.maps.pictures import MAP_PIXELS, picture
 from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.study.reading import open_study
 
+pytestmark = pytest.mark.usefixtures("estimated_plans")
 SPEC = """\
 [surface]
 kind = "file"

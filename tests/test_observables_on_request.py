@@ -25,6 +25,7 @@ from gfmd_cli.study.observables import OBSERVABLES, SolvedContact
 from gfmd_cli.study.reading import open_study, read_rows
 from gfmd_cli.study.run import RunOptions, run_study
 
+pytestmark = pytest.mark.usefixtures("estimated_plans")
 SPEC = power_spec(
     n=[0, 2],
     points=48,
@@ -51,14 +52,6 @@ def study_of(output_of, folder, *overrides, text=SPEC):
     options = [word for override in overrides for word in ("--set", override)]
     output_of("run", folder / "spec.toml", "-o", folder / "s.h5", "-q", "-j", "1", *options)
     return folder / "s.h5"
-
-
-@pytest.fixture(scope="module", autouse=True)
-def estimated_plans():
-    """The same transforms in all studies, to the last bit: a busy machine may measure others."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("GFMD_PLANS", "estimated")
-        yield
 
 
 @pytest.fixture(scope="module")

@@ -6,6 +6,7 @@ ends of the number range.
 
 import json
 import tempfile
+from functools import cache
 from math import isfinite, sqrt
 from pathlib import Path
 
@@ -259,6 +260,7 @@ def elastomer_table(n, modulus=1.0):
     return {"kind": "power", "n": n, "k_n": modulus}
 
 
+@cache
 def numbers(n, modulus=1.0, h_std=1.0, length=1.0):
     """Reduced results and error bars of one contact in some units."""
     surface = {"kind": "self-affine", "cutoff": 0.06, "h_std": h_std, "length": length}
