@@ -288,9 +288,8 @@ def test_coarse_to_fine_and_back_loses_the_highest_mode_only(coarse, fine, dimen
 
 @pytest.mark.parametrize("shape", [(513, 512), (512, 777), (600, 600), (1, 300000)])
 @pytest.mark.parametrize("precision", ["single", "double"])
-def test_threads_change_nothing(shape, precision, monkeypatch):
+def test_threads_change_nothing(shape, precision):
     """Grids that are large enough for two threads; the shares of three are of different size."""
-    monkeypatch.setenv("GFMD_PLANS", "estimated")  # measured ones would take nearly all of the time
     size = {"points": shape[1], "points_y": shape[0], "precision": precision}
     one, *others = [Grid(**size, threads=threads) for threads in (1, 2, 3)]
     field = np.random.default_rng(3).normal(size=one.shape).astype(one.real)
