@@ -1099,3 +1099,13 @@ def test_a_table_whose_end_was_never_written_is_refused(tmp_path):
     path.write_bytes(b"".join(rows[:9]).ljust(len(content), b"\0"))
     with pytest.raises(InputError, match=r"h\.txt:10: zero bytes in the table"):
         read_topography(path)
+
+
+def test_a_text_that_looks_like_a_microscope_file_is_refused(tmp_path):
+    """UTF-32 passes for a binary format, with sides of 1e-320 m."""
+    pytest.importorskip("SurfaceTopography")
+    path = tmp_path / "h.txt"
+    rows = "\n".join(" ".join(map(str, row)) for row in np.eye(32))
+    path.write_text(rows, encoding="utf-32")
+    with pytest.raises(InputError, match=r"h\.txt: "):
+        read_topography(path)

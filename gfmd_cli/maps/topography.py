@@ -36,6 +36,7 @@ from gfmd_cli.spec_table import SpecTable
 
 MANY_POINTS = 8  # along one axis; a choice: no map has so many beside so few rows or columns
 SPACING_TOLERANCE = 1e-6  # relative: files store sides in single precision or with six digits
+SPACING_RANGE = 1e-100, 1e100  # a choice, also of the scales of a contact: squares stay in range
 AXES = ("y", "x")
 
 Interval = Annotated[tuple[Annotated[float, Key(ge=0)], float], Strict(False)]
@@ -242,13 +243,17 @@ def ends_without_heights(first: int, last: int) -> str:
 def _spacing(data: HeightMap, shape: tuple[int, ...]) -> tuple[float, ...] | None:
     """Distance between neighbouring points along each axis, None where the file does not state it.
 
-    Raises InputError where it is not positive.
+    Raises InputError where it is not positive, or out of range: the format was not recognised.
     """
     if data.sides is None:
         return None
     steps = [side / points for side, points in zip(data.sides, shape, strict=True)]
-    if not all(np.isfinite(step) and step > 0 for step in steps):
-        raise InputError(f"the sides of the map are {data.sides}; they must be positive")
+    low, high = SPACING_RANGE
+    if not all(low <= step <= high for step in steps):
+        raise InputError(
+            f"the sides of the map are {data.sides}; they must be positive, and spacings from "
+            f"{low:g} to {high:g}"
+        )
     if max(steps) - min(steps) <= SPACING_TOLERANCE * max(steps):
         steps = [steps[-1]] * len(steps)
     return tuple(map(float, steps))
