@@ -6,6 +6,7 @@ import random
 import re
 
 import numpy as np
+import pyfftw
 import pytest
 
 from gfmd_cli.grid import plans
@@ -148,6 +149,26 @@ def test_plans_do_not_depend_on_what_else_is_known(wisdom, tmp_path, monkeypatch
             Grid(points).transform()
     assert known[0] == known[-1]
     assert known[0] != known[1]
+
+
+@pytest.mark.parametrize("way", ["estimated", ""])
+def test_a_process_searches_for_the_plans_of_a_grid_once(tmp_path, monkeypatch, way):
+    """Also where FFTW has planned another one since; an estimate of 1024^2 takes 20 ms or more."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    monkeypatch.setenv("GFMD_PLANS", way)
+    monkeypatch.setattr(plans, "_estimates", {})
+    plans.plan_with(None)
+    for points in (26, 34):
+        Grid(points).transform()
+    flags, make = set(), pyfftw.FFTW
+
+    def note(*arrays, **options):
+        flags.add(options["flags"])
+        return make(*arrays, **options)
+
+    monkeypatch.setattr(pyfftw, "FFTW", note)
+    Grid(26).transform()
+    assert flags == {("FFTW_ESTIMATE" if way else "FFTW_MEASURE", "FFTW_WISDOM_ONLY")}
 
 
 @pytest.mark.parametrize(

@@ -12,6 +12,8 @@ from fourier import backward, forward
 from gfmd_cli.grid import shared_transforms
 from gfmd_cli.grid.distributed import DistributedGrid
 from gfmd_cli.grid.fft_grid import Grid
+from gfmd_cli.physics.elastomers import Power
+from gfmd_cli.physics.scenes import build_scene
 from gfmd_cli.physics.self_affine import SelfAffine
 
 ROUNDING = 1e-14  # a few units in the last place, times log2 of the size, for fields of order one
@@ -300,6 +302,19 @@ def test_threads_change_nothing(shape, precision):
             forward(other, field), modes, atol=8 * eps * abs(modes).max(), rtol=0
         )
         np.testing.assert_allclose(backward(other, modes), field, atol=50 * eps, rtol=0)
+
+
+def test_a_surface_is_drawn_and_reduced_on_one_grid(monkeypatch):
+    """Each grid takes time for its plans and its memory."""
+    make, sizes = shared_transforms.planned_transforms, []
+
+    def note(plan, size):
+        sizes.append(size)
+        return make(plan, size)
+
+    monkeypatch.setattr(shared_transforms, "planned_transforms", note)
+    build_scene(SelfAffine(cutoff=0.1), Power(n=1), 32)
+    assert sizes == [32**2]
 
 
 def test_a_plan_measured_for_the_first_time_destroys_nothing(tmp_path, monkeypatch):

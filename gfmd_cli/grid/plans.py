@@ -99,6 +99,8 @@ _planning: ContextVar[_Planning] = ContextVar("planning", default=_CACHED)
 _known: Wisdom = {}
 """What this process has read or measured for one run."""
 _known_to = _CACHED  # this run; the wisdom of another one may differ
+_estimates: Wisdom = {}
+"""What this process has estimated, which is the same for all runs."""
 
 
 def plan_with(
@@ -151,15 +153,17 @@ def planned_transforms(make: Callable[[Planner], T], size: int = 0) -> T:
     """
     fftw = partial(pyfftw.FFTW, planning_timelimit=PLANNING_SECONDS[0] + PLANNING_SECONDS[1] * size)
     with _planner:
-        if are_estimated():
-            pyfftw.forget_wisdom()  # FFTW does not estimate what it has measured
-            return make(partial(fftw, flags=("FFTW_ESTIMATE",)))
         if _known_to != _planning.get():  # a run in another thread has planned since
             _forget()
-        key = _key(make)
+        key, known = _key(make), _estimates if are_estimated() else _known
         with suppress(KeyError, RuntimeError):  # not known
-            return _by_wisdom(_known[key], make, fftw)
-        return _measured(key, make, fftw)
+            return _by_wisdom(known[key], make, fftw)
+        return (_searched if are_estimated() else _measured)(known, key, make, fftw)
+
+
+def _effort() -> str:
+    """How FFTW compares plans."""
+    return "FFTW_ESTIMATE" if are_estimated() else "FFTW_MEASURE"
 
 
 def _key(make: Callable[[Planner], Any]) -> str:
@@ -181,29 +185,36 @@ def _key(make: Callable[[Planner], Any]) -> str:
 def _by_wisdom(texts: list[str], make: Callable[[Planner], T], fftw: Planner) -> T:
     """The transforms that `make` plans, from their wisdom. Raises RuntimeError if it lacks one."""
     pyfftw.forget_wisdom()
-    double, single = texts
-    pyfftw.import_wisdom((double.encode(), single.encode(), b""))  # third: of long double
-    return make(partial(fftw, flags=("FFTW_MEASURE", "FFTW_WISDOM_ONLY")))
+    # the import of a text takes 0.25 ms, even if it has no plans, which are in brackets
+    double, single = (text.encode() if text.count("(") > 1 else b"" for text in texts)
+    pyfftw.import_wisdom((double, single, b""))  # third: of long double
+    return make(partial(fftw, flags=(_effort(), "FFTW_WISDOM_ONLY")))
 
 
-def _measured(key: str, make: Callable[[Planner], T], fftw: Planner) -> T:
-    """The transforms that `make` plans, measured unless another process has measured them."""
+def _searched(known: Wisdom, key: str, make: Callable[[Planner], T], fftw: Planner) -> T:
+    """The transforms that `make` plans; their wisdom is added to `known`."""
+    pyfftw.forget_wisdom()
+    transforms = make(partial(fftw, flags=(_effort(),)))
+    known[key] = _export()
+    with suppress(RuntimeError):  # the time limit has ended the search
+        transforms = _by_wisdom(known[key], make, fftw)
+    return transforms
+
+
+def _measured(known: Wisdom, key: str, make: Callable[[Planner], T], fftw: Planner) -> T:
+    """The same, measured and stored unless another process has measured them."""
     of_study = _planning.get().folder
     folder = of_study or cache_folder()
     with _planning_lock(folder) as alone:
         stored = read_wisdom(folder) or {}
-        _known.update(stored)
+        known.update(stored)
         with suppress(KeyError, RuntimeError):
             return _by_wisdom(stored[key], make, fftw)
-        pyfftw.forget_wisdom()
-        transforms = make(partial(fftw, flags=("FFTW_MEASURE",)))
-        _known[key] = stored[key] = _export()
-        with suppress(RuntimeError):  # the time limit has ended the search
-            transforms = _by_wisdom(_known[key], make, fftw)
+        transforms = _searched(known, key, make, fftw)
         if of_study is None:
             _add_to_cache(key, alone)
         else:
-            _write(folder, stored)
+            _write(folder, stored | {key: known[key]})
     if of_study is not None:
         with _planning_lock(cache_folder()) as alone:
             _add_to_cache(key, alone)

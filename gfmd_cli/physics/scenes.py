@@ -40,7 +40,9 @@ def build_scene(
     ranks : the processes that share large grids
     """
     grid, height = sample(surface, points, points_y, ranks)
-    scene = reduce_scene(replace(grid, threads=threads), height, elastomer)
+    if threads > 1:
+        grid = replace(grid, threads=threads)
+    scene = reduce_scene(grid, height, elastomer)
     return replace(scene, may_touch=touchable(surface.void(scene.grid), scene.grid))
 
 

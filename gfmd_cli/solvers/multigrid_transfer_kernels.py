@@ -30,7 +30,7 @@ def compute_penalty(fine, threshold, weighted, penalty, weights, a, b):
     if they are contact states (0). The weight of a hat is P^T w, at most 1.
     """
     (height, n), m = fine.shape, weights.shape[1]
-    rows = np.empty((3, n), np.int32)
+    rows = np.empty((3, n), np.uint8)  # the sums below are at most 144
     down, squared, loaded = rows[0], rows[1], rows[2]  # columns weighted by 0 0 1, 1 4 1, 1 2 1
     for i in range(a, b):
         above, here, below = fine[(2 * i - 1) % height], fine[2 * i], fine[2 * i + 1]

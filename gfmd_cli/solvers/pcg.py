@@ -274,9 +274,8 @@ class _Run:
 
     def update_direction(self, beta: float, *, is_kept: bool = False) -> Field:
         """Compute the direction and the projected move along it; see `pcg_kernels`."""
-        assert self.preconditioner is not None
         fields = (self.h, self.u, self.sigma, self.own_state, self.threshold)
-        direction = (self.preconditioner.z, beta, self.direction, is_kept, self.state.length)
+        direction = (beta, self.direction, is_kept, self.state.length)
         return self.rows.sums(4, kernels.update_direction, *fields, *direction, self.padded)
 
     def choose_move(self, best: float, stopped: bool) -> MoveChoice:

@@ -33,21 +33,23 @@ def classify(h, u, sigma, contact_state, out, a, b):
 
 @kernel
 def update_direction(
-    h, u, sigma, state, threshold, z, beta, direction, is_kept, length, padded, out, a, b
+    h, u, sigma, state, threshold, beta, direction, is_kept, length, padded, out, a, b
 ):
     """Set the direction d to z + beta d on the free points, and compute the move along it.
 
-    The direction stays where it `is_kept`. The move max(u + length d, h) - u is written to
-    `padded`, which may be the memory of z. Returns the sums of direction times force and of move
-    times force, and the number of points stopped at h.
+    z is in `padded`, where the move max(u + length d, h) - u takes its place. The direction stays
+    where it `is_kept`. Returns the sums of direction times force, of move times force and of the
+    squares of the move, and the number of points stopped at h.
     """
     for i in range(a, b):
         descent = fall = square = 0.0
         stopped = 0
+        # Two loops, because the compiler does not vectorise one loop over as many arrays.
+        if not is_kept:
+            for j in range(h.shape[1]):
+                d = padded[i, j] + beta * direction[i, j]
+                direction[i, j] = 0.0 if state[i, j] >= threshold else d
         for j in range(h.shape[1]):
-            if not is_kept:
-                d = 0.0 if state[i, j] >= threshold else z[i, j] + beta * direction[i, j]
-                direction[i, j] = d
             d = direction[i, j]  # as rounded
             step, room = length * d, h[i, j] - u[i, j]
             move = max(step, room)
