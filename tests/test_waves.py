@@ -1,12 +1,19 @@
 """The texture of a surface: anisotropy, copies of a patch, waves of the Nyquist wavenumber."""
 
+from dataclasses import astuple
+
 import numpy as np
 import pytest
 
 from gfmd_cli.grid.fft_grid import Grid
+from gfmd_cli.physics import scenes
 from gfmd_cli.physics.discretisation_error import MAX_REPETITIONS
+from gfmd_cli.physics.elastomers import Power
+from gfmd_cli.physics.file_surface import FileSurface
+from gfmd_cli.physics.indenters import Parabola, Wave
 from gfmd_cli.physics.self_affine import SelfAffine
-from gfmd_cli.physics.waves import texture
+from gfmd_cli.physics.surfaces import sample
+from gfmd_cli.physics.waves import radial_power, texture
 
 
 def waves(grid, *pairs):
@@ -159,3 +166,47 @@ def test_the_waves_of_two_points_are_found_along_each_axis():
     line = Grid(32, 1)
     assert texture(line, (-1.0) ** np.arange(32)).has_nyquist_waves
     assert not texture(line, np.cos(2 * np.pi * 15 * np.arange(32) / 32)).has_nyquist_waves
+
+
+@pytest.mark.parametrize(
+    ("kind", "points", "points_y", "transformed"),
+    [
+        ("self-affine", 64, 64, (64, 64)),  # half of them are two points per lambda_s
+        ("self-affine", 256, 256, (64, 64)),
+        ("self-affine", 72, 160, (40, 36)),
+        ("wave", 128, 1, (16,)),
+        ("map", 96, 48, (12, 24)),
+        ("mirrored map", 96, 48, (24, 48)),
+        ("profile", 96, 1, (24,)),
+        ("parabola", 64, 64, (64, 64)),  # it has waves of any length
+    ],
+)
+def test_waves_are_counted_on_the_coarsest_grid_that_has_them_all(
+    tmp_path, monkeypatch, kind, points, points_y, transformed
+):
+    heights = np.random.default_rng(1).normal(size=(10, 20))
+    path = tmp_path / "h.npy"
+    np.save(path, heights[0] if kind == "profile" else heights)
+    scan = {"path": path, "interpolation": "fourier", "length": 2.0}
+    surface = {
+        "self-affine": SelfAffine(cutoff=1 / 16, length_y=1.0),
+        "wave": Wave(),
+        "map": FileSurface(periodic=True, length_y=1.0, **scan),
+        "mirrored map": FileSurface(periodic=False, edges="mirror", length_y=1.0, **scan),
+        "profile": FileSurface(periodic=True, **scan),
+        "parabola": Parabola(radius=1.0),
+    }[kind]
+    shapes = []
+
+    def note(grid, height):
+        shapes.append(grid.whole_shape)
+        return radial_power(grid, height)
+
+    monkeypatch.setattr(scenes, "radial_power", note)
+    scene = scenes.build_scene(surface, Power(n=2), points, points_y=points_y)
+    grid, heights = sample(surface, points, points_y)
+    all_points = scenes.reduce_scene(grid, heights, Power(n=2))
+    assert shapes == [transformed, scene.grid.whole_shape]
+    assert scene.delta_sigma == pytest.approx(all_points.delta_sigma, rel=1e-12)
+    for one, other in zip(astuple(scene.shells), astuple(all_points.shells), strict=True):
+        np.testing.assert_allclose(one, other, rtol=1e-9)

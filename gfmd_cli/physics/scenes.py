@@ -1,13 +1,14 @@
 """Scenes: a surface and an elastomer on a grid, in the units of the surface."""
 
 from dataclasses import replace
+from itertools import starmap
 from math import sqrt
 
 import numpy as np
 
 from gfmd_cli.errors import InputError
 from gfmd_cli.grid.arrays import Field, Mask, aligned, dot, row_blocks
-from gfmd_cli.grid.fft_grid import Grid
+from gfmd_cli.grid.fft_grid import Grid, Shape
 from gfmd_cli.grid.ranks import Ranks
 from gfmd_cli.physics.contact import Scene
 from gfmd_cli.physics.indenters import RigidSurface
@@ -42,8 +43,29 @@ def build_scene(
     grid, height = sample(surface, points, points_y, ranks)
     if threads > 1:
         grid = replace(grid, threads=threads)
-    scene = reduce_scene(grid, height, elastomer)
+    scene = reduce_scene(grid, height, elastomer, _shape_with_all_waves(surface, grid))
     return replace(scene, may_touch=touchable(surface.void(scene.grid), scene.grid))
+
+
+def _shape_with_all_waves(surface: RigidSurface, grid: Grid) -> Shape:
+    """Shape of the coarsest grid of every 2nd, 4th, ... point that resolves all waves of a surface.
+
+    That of the grid itself where the shortest wave is not known, or processes share the grid.
+    """
+    if not (surface.band_limited and grid.whole):
+        return grid.whole_shape
+    least = (surface.smallest_grid_y(), surface.smallest_grid())[-grid.dimension :]
+    return tuple(starmap(_coarsest, zip(grid.whole_shape, least, strict=True)))
+
+
+def _coarsest(points: int, least: int) -> int:
+    """The smallest of points, points / 2, points / 4, ... above `least`, if it is a whole number.
+
+    On `least` points, the shortest wave is that of the Nyquist wavenumber, whose phase is lost.
+    """
+    while points % 2 == 0 and points // 2 > least:
+        points //= 2
+    return points
 
 
 def touchable(void: Mask | None, grid: Grid) -> Mask | None:
@@ -58,8 +80,13 @@ def touchable(void: Mask | None, grid: Grid) -> Mask | None:
     return ~void
 
 
-def reduce_scene(grid: Grid, height: Field, elastomer: LinearElastomer) -> Scene:
-    """Reduce heights [m], which are overwritten, and stiffness to the scales of the surface."""
+def reduce_scene(
+    grid: Grid, height: Field, elastomer: LinearElastomer, shape: Shape | None = None
+) -> Scene:
+    """Reduce heights [m], which are overwritten, and stiffness to the scales of the surface.
+
+    `shape` is that of a grid of every 2nd, 4th, ... point that has all waves of the surface, too.
+    """
     blocks = [height[rows] for rows in row_blocks(height)]
     sums, highest, lowest = zip(*((b.sum(), b.max(), b.min()) for b in blocks), strict=True)
     mean = grid.total(float(sum(sums))) / grid.size
@@ -73,7 +100,7 @@ def reduce_scene(grid: Grid, height: Field, elastomer: LinearElastomer) -> Scene
     for block in blocks:
         block *= 1 / rms
     stiffness, stiffest = _stiffness(grid, elastomer)
-    m, power, modes = radial_power(grid, height)
+    m, power, modes = radial_power(*_thinned(grid, height, shape or grid.whole_shape))
     q = m * (2 * np.pi / grid.length)
     k = elastomer.stiffness(q, grid.length)
     unit = elastomer.unit_stiffness(q, grid.length)
@@ -104,6 +131,14 @@ def reduce_scene(grid: Grid, height: Field, elastomer: LinearElastomer) -> Scene
         delta_sigma=delta_sigma,
         shells=shells(q, power * h_std**2, k, elastomer.gamma(q, grid.length), modes),
     )
+
+
+def _thinned(grid: Grid, height: Field, shape: Shape) -> tuple[Grid, Field]:
+    """A coarser grid of this shape, and the heights at its points."""
+    if shape == grid.whole_shape:
+        return grid, height
+    every = zip(grid.whole_shape, shape, strict=True)
+    return grid.coarser(shape), height[tuple(slice(None, None, n // m) for n, m in every)]
 
 
 def _stiffness(grid: Grid, elastomer: LinearElastomer) -> tuple[Field, float]:
