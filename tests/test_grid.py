@@ -215,6 +215,31 @@ def test_columns_may_be_copied_in_blocks(monkeypatch, shape, precision, threads)
     )
 
 
+@pytest.mark.parametrize("kept", [1, 9, 17, 33])
+def test_blocks_of_columns_of_zeros_are_not_transformed(monkeypatch, kept):
+    for name, value in (("MIN_COPIED_BYTES", 0), ("BLOCK_COEFFICIENTS", 100)):
+        monkeypatch.setattr(shared_transforms, name, value)
+    monkeypatch.setattr(shared_transforms, "MIN_BLOCK_COLUMNS", 8)
+    grid = Grid(64, points_y=48)
+    draw = np.random.default_rng(2).normal(size=(2, 48, kept))
+    grid.work[...] = 0.0
+    grid.work[:, :kept] = draw[0] + 1j * draw[1]
+    grid.work[:, [0, -1]] = 0.0  # only the coefficients of real fields
+    modes, transformed = grid.work.copy(), []
+    for columns in grid._transforms.along_columns.blocks:
+
+        def note(columns=columns, backward=columns.backward):
+            transformed.append(columns.part.start)
+            backward()
+
+        columns.backward = note
+    field = grid.field_of_work(kept=kept)
+    np.testing.assert_allclose(field, np.fft.irfft2(modes, field.shape) * grid.size, atol=1e-11)
+    starts = [columns.part.start for columns in grid._transforms.along_columns.blocks]
+    assert transformed == [start for start in starts if start < kept]
+    assert len(starts) > 3
+
+
 def test_the_operator_on_a_line_is_the_convolution_with_its_kernel():
     grid = Grid(10, 1)
     symbol = np.random.default_rng(3).random(grid.spectral_shape)

@@ -229,9 +229,12 @@ class Grid:
         self._transforms.to_columns()
         self._transforms.along_columns.forward()
 
-    def transform_back(self) -> None:
-        """`padded` <- values of the coefficients in `work`, without the factor 1/size."""
-        self._transforms.along_columns.backward()
+    def transform_back(self, kept: int | None = None) -> None:
+        """`padded` <- values of the coefficients in `work`, without the factor 1/size.
+
+        Only the first `kept` columns of the whole grid, if given, are not zero.
+        """
+        self._transforms.along_columns.backward(None if kept is None else kept - self.span[0])
         self._transforms.to_values()
 
     def _filter_by(
@@ -255,9 +258,12 @@ class Grid:
         self.transform()
         return self.work
 
-    def field_of_work(self, factor: float = 1.0) -> Field:
-        """The field of the coefficients in `work`, which are lost, times a factor."""
-        self.transform_back()
+    def field_of_work(self, factor: float = 1.0, kept: int | None = None) -> Field:
+        """The field of the coefficients in `work`, which are lost, times a factor.
+
+        `kept` as in `transform_back`.
+        """
+        self.transform_back(kept)
         return np.multiply(self.padded[..., : self.points], factor, out=self.empty())
 
     def filter_padded(self, symbol: Field, blocks: Sequence[int] | None = None) -> float:
@@ -390,8 +396,8 @@ class Grid:
             modes[m_y[-1]] *= 0.5
         if halved_x and self.ends[1]:
             modes[:, -1] *= 0.5
-        grid = target if self.whole else self
-        modes = grid.select_modes(modes, m_y, m_x[-1] + 1, self, target)
+        grid, kept = target if self.whole else self, int(m_x[-1]) + 1
+        modes = grid.select_modes(modes, m_y, kept, self, target)
         target.work[...] = 0.0
         target.as_rows(target.work)[m_y, : modes.shape[1]] = modes
-        return target.field_of_work(1.0 / self.size)
+        return target.field_of_work(1.0 / self.size, kept)

@@ -140,9 +140,9 @@ class ColumnTransforms:
         """Transform all columns."""
         self.run(lambda columns: columns.forward())
 
-    def backward(self) -> None:
-        """Transform all columns back."""
-        self.run(lambda columns: columns.backward())
+    def backward(self, kept: int | None = None) -> None:
+        """Transform all columns back; all but the first `kept`, if given, are zero."""
+        self.run(lambda columns: columns.backward(), kept)
 
     def filter(self, multiply: Callable[[Columns], None]) -> None:
         """Transform the columns, multiply them and transform them back."""
@@ -154,13 +154,15 @@ class ColumnTransforms:
 
         self.run(step)
 
-    def run(self, step: Callable[[Columns], None]) -> None:
-        """Call `step` for all columns."""
-        rows = len(self.work)
+    def run(self, step: Callable[[Columns], None], kept: int | None = None) -> None:
+        """Call `step` for all columns, or for blocks that contain one of the first `kept`."""
+        rows, end = len(self.work), self.work.shape[1] if kept is None else kept
 
         def share(numbers: range) -> None:
             for i in numbers:
                 columns = self.blocks[i]
+                if columns.part.start >= end:
+                    continue
                 if self.is_copied:
                     columns.coefficients[:rows] = self.work[:, columns.part]
                     columns.coefficients[rows:] = 0.0

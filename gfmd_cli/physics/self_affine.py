@@ -118,7 +118,7 @@ class SelfAffine(RigidSurface):
     def heights_on(self, grid: Grid) -> Field:
         """Heights [m] at the points of a grid that this process holds."""
         self._write_modes(grid)
-        return grid.field_of_work()
+        return grid.field_of_work(kept=self.highest_modes[1] + 1)
 
     def _amplitude(self, m: Field) -> Field:
         """sqrt(C(q)) at |q| = 2 pi m / L, zero beyond the cut-off.
