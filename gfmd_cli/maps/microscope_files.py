@@ -34,16 +34,16 @@ from gfmd_cli.maps.text_tables import MATRIX_COLUMNS, OF_SIDES, is_height, is_nu
 
 COMPRESSED = {".gz", ".bz2", ".xz", ".zst", ".7z", ".zip"}
 TABLE_FORMATS = {"xyz", "asc"}  # formats of SurfaceTopography that are tables of numbers
-IN_TEXT = (
-    "in text, whose header is not read; save it in binary form, or as a table of x, y and height"
-)
+IN_TEXT = "in text, whose header is not read; save it as a table of x, y and height"
+SDF_IN_TEXT = f"an SDF file {IN_TEXT}, or in the binary form of ISO 25178-71 (bISO-1.0)"
+ZYGO_IN_TEXT = f"a file of Zygo {IN_TEXT}, or in binary form"
 REFUSED = {
-    b"aBCR-": f"an SDF file {IN_TEXT}",
-    b"aISO-": f"an SDF file {IN_TEXT}",
-    b"aNIST-": f"an SDF file {IN_TEXT}",
+    b"aBCR-": SDF_IN_TEXT,
+    b"aISO-": SDF_IN_TEXT,
+    b"aNIST-": SDF_IN_TEXT,
     b"DSAA": f"a grid of Surfer {IN_TEXT}",
-    b"Zygo XYZ Data File": f"a file of Zygo {IN_TEXT}",
-    b"Zygo ASCII Data File": f"a file of Zygo {IN_TEXT}",
+    b"Zygo XYZ Data File": ZYGO_IN_TEXT,
+    b"Zygo ASCII Data File": ZYGO_IN_TEXT,
     b"DSCOMPRESSED": "a compressed file of MountainsMap; save it without compression",
     b"Binary TrueMap Data File\r": "a file of TrueMap before version 2.0; save it in version 2.0",
 }
