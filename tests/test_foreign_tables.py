@@ -405,12 +405,12 @@ GRID = "NCOLS 300\nnrows 12\nxllcorner 5.0\nyllcorner 0\ncellsize 0.5\n"
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16"])
 def test_an_esri_grid_has_sides_and_no_height_without_data(saved, stated, decimal, encoding):
     marked = HEIGHTS.copy()
-    marked[3, 4] = -9999
+    marked[-4, 4] = -9999
     header = (GRID + stated).replace(".", decimal)
     text = header + matrix(" ", decimal=decimal, heights=marked)
     read = read_topography(saved(text, encoding))
     assert np.argwhere(read.missing).tolist() == [[3, 4]]
-    assert read.heights[~read.missing] == pytest.approx(np.delete(HEIGHTS.ravel(), 3 * 300 + 4))
+    assert read.heights[~read.missing] == pytest.approx(np.delete(HEIGHTS[::-1], 3 * 300 + 4))
     assert (read.spacing, read.metres, read.periodic) == ((0.5, 0.5), False, False)
 
 
@@ -430,7 +430,17 @@ def test_a_wrong_header_of_an_esri_grid_is_refused(saved, old, new, reason):
 def test_a_row_of_an_esri_grid_may_have_several_lines(saved, parts):
     rows = (np.split(row, np.cumsum(parts)[:-1]) for row in HEIGHTS)
     text = "".join(matrix(" ", heights=[part]) for row in rows for part in row)
-    assert read_topography(saved(GRID + text)).heights == pytest.approx(HEIGHTS)
+    assert read_topography(saved(GRID + text)).heights == pytest.approx(HEIGHTS[::-1])
+
+
+def test_an_esri_grid_is_the_map_of_its_points(saved):
+    """Its first row is the northern one, so that the y of the rows decreases."""
+    points = (
+        f"{5 + j / 2} {11 - i} {height}\n" for (i, j), height in np.ndenumerate(HEIGHTS[:, ::20])
+    )
+    of_points = read_topography(saved("".join(points)))
+    text = GRID.replace("300", "15") + matrix(" ", heights=HEIGHTS[:, ::20])
+    assert read_topography(saved(text)).heights == pytest.approx(of_points.heights)
 
 
 @pytest.mark.parametrize("shape", [(300, 12), (9, 400), (4, 900)])
@@ -447,8 +457,9 @@ def test_an_esri_grid_whose_rows_begin_within_lines_is_refused(saved, shape):
 )
 def test_text_formats_with_scales_that_are_not_read_are_refused(saved, first, encoding):
     content = f"{first}\nZscale = 1e-9\n*\n" + matrix(" ")
-    with pytest.raises(InputError, match="in text, whose header is not read; save it in binary"):
+    with pytest.raises(InputError, match="in text, whose header is not read; save it") as error:
         read_topography(saved(content, encoding))
+    assert ("binary form" in str(error.value)) == (first != "DSAA")  # of Surfer, none is read
 
 
 def test_points_of_zygo_with_pixels_and_micrometres_are_refused_as_such(saved):

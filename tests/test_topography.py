@@ -678,7 +678,7 @@ def test_a_truemap_file_of_the_first_version_is_refused_as_such(tmp_path):
         read_topography(tmp_path / "h.tmd")
 
 
-def mountains_map(unit, levels):
+def mountains_map(unit, levels, padding=b"\0"):
     """A file of MountainsMap: points 0.1 and 0.2 apart, levels of 0.001, all in a unit."""
     rows, columns = levels.shape
     header = bytearray(512)
@@ -686,15 +686,16 @@ def mountains_map(unit, levels):
     struct.pack_into("<Hii", header, 98, 32, int(levels.min()), int(levels.max()))
     struct.pack_into("<iiI3f", header, 108, columns, rows, levels.size, 0.1, 0.2, 1e-3)
     for place in range(180, 276, 16):
-        header[place : place + len(unit)] = unit
+        header[place : place + 16] = unit.ljust(16, padding)
     return bytes(header) + levels.astype("<i4").tobytes()
 
 
+@pytest.mark.parametrize("padding", [b"\0", b" "])
 @pytest.mark.parametrize("unit", [b"um", b"\xb5m", b"\xe6m", b"\xc2\xb5m", b"\xce\xbcm", b"\xecm"])
-def test_micrometres_of_mountainsmap_are_read_in_every_encoding(tmp_path, unit):
+def test_micrometres_of_mountainsmap_are_read_in_every_encoding(tmp_path, unit, padding):
     pytest.importorskip("SurfaceTopography")
     levels = np.arange(12 * 16).reshape(12, 16) ** 2
-    (tmp_path / "h.sur").write_bytes(mountains_map(unit, levels))
+    (tmp_path / "h.sur").write_bytes(mountains_map(unit, levels, padding))
     read = read_topography(tmp_path / "h.sur")
     assert read.spacing == pytest.approx((2e-7, 1e-7))
     assert read.heights == pytest.approx(1e-9 * levels)

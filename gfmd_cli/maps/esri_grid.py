@@ -1,4 +1,7 @@
-"""ESRI ASCII grids: number and size of the cells in a header, and rows from north to south."""
+"""ESRI ASCII grids: number and size of the cells in a header, and rows from north to south.
+
+The map has its rows from south to north, as y increases.
+"""
 
 import re
 from itertools import accumulate
@@ -33,7 +36,7 @@ def read_esri_grid(path: Path, dataset: str | None) -> HeightMap:
         check_layout(shape, np.dtype(float))
         lines = list(filter(np.size, (np.array(each.split(), float) for each in (line, *file))))
     _check_rows([len(each) for each in lines], *shape)
-    heights = np.concatenate(lines).reshape(shape)
+    heights = np.concatenate(lines).reshape(shape)[::-1]
     missing = header.get("nodata_value", NO_DATA)
     sides = tuple(header["cellsize"] * points for points in shape)
     heights = np.ma.masked_equal(heights, missing)

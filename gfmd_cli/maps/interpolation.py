@@ -138,7 +138,7 @@ def monotone(
 ) -> Field:
     """A periodic map or line on a finer grid of the same cell, without new maxima and minima.
 
-    Monotone cubics (Fritsch and Carlson 1980) along one axis and then along the other; the mean of
+    Monotone cubics (Fritsch and Butland 1984) along one axis and then along the other; the mean of
     both orders, so that no axis is preferred. Every height lies between those of the four points
     around it; plateaus remain plateaus.
 

@@ -34,16 +34,16 @@ from gfmd_cli.maps.text_tables import MATRIX_COLUMNS, OF_SIDES, is_height, is_nu
 
 COMPRESSED = {".gz", ".bz2", ".xz", ".zst", ".7z", ".zip"}
 TABLE_FORMATS = {"xyz", "asc"}  # formats of SurfaceTopography that are tables of numbers
-IN_TEXT = (
-    "in text, whose header is not read; save it in binary form, or as a table of x, y and height"
-)
+IN_TEXT = "in text, whose header is not read; save it as a table of x, y and height"
+SDF_IN_TEXT = f"an SDF file {IN_TEXT}, or in the binary form of ISO 25178-71 (bISO-1.0)"
+ZYGO_IN_TEXT = f"a file of Zygo {IN_TEXT}, or in binary form"
 REFUSED = {
-    b"aBCR-": f"an SDF file {IN_TEXT}",
-    b"aISO-": f"an SDF file {IN_TEXT}",
-    b"aNIST-": f"an SDF file {IN_TEXT}",
+    b"aBCR-": SDF_IN_TEXT,
+    b"aISO-": SDF_IN_TEXT,
+    b"aNIST-": SDF_IN_TEXT,
     b"DSAA": f"a grid of Surfer {IN_TEXT}",
-    b"Zygo XYZ Data File": f"a file of Zygo {IN_TEXT}",
-    b"Zygo ASCII Data File": f"a file of Zygo {IN_TEXT}",
+    b"Zygo XYZ Data File": ZYGO_IN_TEXT,
+    b"Zygo ASCII Data File": ZYGO_IN_TEXT,
     b"DSCOMPRESSED": "a compressed file of MountainsMap; save it without compression",
     b"Binary TrueMap Data File\r": "a file of TrueMap before version 2.0; save it in version 2.0",
 }
@@ -54,8 +54,10 @@ REASONS = {
 }
 """Reasons of refusals, by the error of the reader, which does not say them."""
 TRUEMAP, TRUEMAP_MAGIC_BYTES, TRUEMAP_COMMENT_BYTES = b"Binary TrueMap Data File v2.0", 32, 24
-MOUNTAINSMAP, MICROMETRES = b"DIGITAL SURF", re.compile(rb"(?:\xc2\xb5|\xce\xbc|\xec)m\0")
-"""Micrometres in the header of MountainsMap: in UTF-8, and with the Greek letter of Windows."""
+MOUNTAINSMAP, MICROMETRES = b"DIGITAL SURF", re.compile(rb"(?:\xc2\xb5|\xce\xbc|\xec)m[\0 ]")
+"""Micrometres in the header of MountainsMap: in UTF-8, and with the Greek letter of Windows.
+
+Zeros or blanks fill the rest of the field."""
 NANOFOCUS_DISTANCES = 1376  # byte of a file of NanoFocus, where its two distances of points begin
 SMALL_FILE = 2**14  # bytes, which the readers of tables parse in a second
 SORTED_ROWS = 20  # heights of so many rows are not sorted by chance; a choice
@@ -162,7 +164,7 @@ def _in_known_form(file: BinaryIO, start: bytes) -> BinaryIO:
         header = start[:TRUEMAP_MAGIC_BYTES] + bytes(TRUEMAP_COMMENT_BYTES)
         return BytesIO(header + text_tables.part(file, end))
     if start.startswith(MOUNTAINSMAP) and MICROMETRES.search(start):
-        header = MICROMETRES.sub(lambda unit: b"\xb5m".ljust(len(unit[0]), b"\0"), start)
+        header = MICROMETRES.sub(lambda unit: b"\xb5m".ljust(len(unit[0]), unit[0][-1:]), start)
         return BytesIO(header + text_tables.part(file, len(start)))
     return file
 
