@@ -242,6 +242,15 @@ def test_points_that_a_table_lacks_are_missing_heights(tmp_path):
     assert read.spacing == pytest.approx(same.spacing)
 
 
+def test_a_table_of_positions_that_is_cut_off_is_refused(tmp_path):
+    """The last height would be wrong: its last digits are lost."""
+    (tmp_path / "points.txt").write_bytes(text(POINTS[:-3])[:-3])
+    with pytest.raises(InputError, match="of the 50 x 40 points of a grid, and its last line"):
+        read_topography(tmp_path / "points.txt")
+    (tmp_path / "whole.txt").write_bytes(text(POINTS).rstrip())
+    assert read_topography(tmp_path / "whole.txt").missing_count == 0
+
+
 THREE_COLUMNS = {
     "scattered points": RNG.random((300, 3)),
     "many scattered points": RNG.random((1000, 3)),

@@ -71,6 +71,12 @@ def read_points(file: BinaryIO) -> HeightMap | None:
         raise InputError("a position in the table is missing or infinite")
     table[np.abs(table[:, -1]) >= MAX_HEIGHT, -1] = np.nan  # a mark, in the unit of the file
     heights, sides, note = _grid(table) if count == 3 else _profile(table)
+    if count == 3 and heights.size > len(table) and not content.endswith((b"\n", b"\r")):
+        raise InputError(
+            f"the table lacks {heights.size - len(table)} of the {heights.shape[1]} x "
+            f"{heights.shape[0]} points of a grid, and its last line does not end with a line "
+            "break: if the file is not cut off, add one"
+        )
     *of_sides, of_heights = factors or [None] * count
     return HeightMap(
         heights=heights if of_heights is None else of_heights * heights,
