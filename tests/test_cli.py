@@ -71,7 +71,9 @@ def test_analyze_prints_records_with_the_columns_of_export_and_theory(gfmd):
     rows = list(csv.DictReader(gfmd("export", "small.h5").output.splitlines()))
     assert len(records) == len(rows) == 8
     theory = {"a_r_persson", "sigma_p_persson", "u_g_persson", "p_star_persson_at_u_g"}
-    assert set(records[0]) == {*rows[0], *theory}
+    closed_form = {f"{name}_einstein" for name in ("a_r", "sigma_p", "u_g")}
+    assert set(records[0]) == {*rows[0], *theory, *closed_form}  # springs
+    assert set(records[-1]) == {*rows[0], *theory}
     for record in records:
         texts = {key: "" if record[key] is None else str(record[key]) for key in rows[0]}
         assert texts in rows

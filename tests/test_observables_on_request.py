@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from specs import power_spec
 
-from gfmd_cli import solve
+from gfmd_cli import compare, solve
+from gfmd_cli.analysis.tables import study_tables
 from gfmd_cli.errors import InputError
 from gfmd_cli.physics.elastomers import Power
 from gfmd_cli.physics.observables import LINEAR_EDGES, LOGARITHMIC_EDGES
@@ -133,6 +134,24 @@ def test_analyze_tells_the_columns_in_a_table_and_in_records(output_of, study):
     for record, row in zip(records, read_rows(study), strict=True):
         expected = {name: row[name] if np.isfinite(row[name]) else None for name in COLUMNS}
         assert {name: record[name] for name in COLUMNS} == expected
+
+
+@pytest.mark.parametrize(
+    "key",
+    [
+        "output.stiffness=true",
+        "output.true_contact=true",
+        "surface.seed=[0, 1]",
+        "accuracy={mean_gap=0.5}",
+    ],
+)
+def test_every_table_has_the_pressure_in_pascals_where_it_was_given(output_of, tmp_path, key):
+    study = study_of(output_of, tmp_path, "load={pressure=[2.5]}", "elastomer.n=1", key)
+    tables = study_tables(compare(study))
+    assert len(tables) == 2
+    for table in tables:
+        column = next(column for column in table.columns if column.unit == "Pa")
+        assert [column.cell(record) for record in table.records] == ["2.5"] * len(table.records)
 
 
 def test_patches_of_a_line_are_lengths(output_of, tmp_path):

@@ -1,5 +1,6 @@
 import json
 import signal
+import sys
 import time
 from pathlib import Path
 from threading import Thread
@@ -63,6 +64,18 @@ def test_what_did_not_converge_is_counted_apart(gfmd):
     state = answer(gfmd("status", "small.h5", "--json"))
     assert state["statuses"] == {"converged": 2, "max_steps": 2}
     assert (state["converged"], state["missing"]) == (2, 0)
+
+
+def test_tasks_that_did_not_converge_are_listed_up_to_a_limit(gfmd, monkeypatch):
+    gfmd("run", "spec.toml", "--set", "solver.max_steps=1")
+    status = ("status", "spec.toml", "--set", "solver.max_steps=1")
+    lines = gfmd(*status).output.splitlines()
+    assert [line for line in lines if line.endswith(": max_steps")] == [
+        "  task 2 power n=1 64 p*=0.1: max_steps",
+        "  task 3 power n=1 64 p*=1: max_steps",
+    ]
+    monkeypatch.setattr(sys.modules["gfmd_cli.cli.status"], "MAX_TASKS", 1)
+    assert "max_steps\n  and 1 more task\n" in gfmd(*status).output
 
 
 def test_each_shard_is_told_where_asked_for(gfmd):

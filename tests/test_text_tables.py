@@ -229,15 +229,32 @@ def test_profiles_with_a_header_of_an_instrument(tmp_path, header):
     assert heights == pytest.approx(1e-6 * POINTS[:50, 2], abs=1e-12)
 
 
-def test_points_on_a_grid_with_gaps_are_refused_with_the_reason(tmp_path):
-    (tmp_path / "points.txt").write_bytes(text(np.delete(POINTS, [7, 900], axis=0)))
-    with pytest.raises(InputError, match="2 of the 50 x 40 points of the grid are missing: add"):
+def test_points_that_a_table_lacks_are_missing_heights(tmp_path):
+    lacking = np.delete(POINTS, [7, 900], axis=0)
+    marked = POINTS.copy()
+    marked[[7, 900], 2] = np.nan
+    for name, points in (("lacking.txt", lacking), ("marked.txt", marked)):
+        (tmp_path / name).write_bytes(text(points))
+    read, same = (read_topography(tmp_path / name) for name in ("lacking.txt", "marked.txt"))
+    assert read.missing_count == 2
+    np.testing.assert_array_equal(read.missing, same.missing)
+    np.testing.assert_array_equal(read.heights, same.heights)
+    assert read.spacing == pytest.approx(same.spacing)
+
+
+def test_a_table_of_positions_that_is_cut_off_is_refused(tmp_path):
+    """The last height would be wrong: its last digits are lost."""
+    (tmp_path / "points.txt").write_bytes(text(POINTS[:-3])[:-3])
+    with pytest.raises(InputError, match="of the 50 x 40 points of a grid, and its last line"):
         read_topography(tmp_path / "points.txt")
+    (tmp_path / "whole.txt").write_bytes(text(POINTS).rstrip())
+    assert read_topography(tmp_path / "whole.txt").missing_count == 0
 
 
 THREE_COLUMNS = {
     "scattered points": RNG.random((300, 3)),
     "many scattered points": RNG.random((1000, 3)),
+    "a grid of which more than half is missing": POINTS[RNG.random(len(POINTS)) < 0.4],
     "two profiles": np.column_stack([np.arange(40.0), RNG.random((40, 2))]),
 }
 

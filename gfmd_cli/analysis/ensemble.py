@@ -51,10 +51,9 @@ class Ensemble:
             return of_study(self.study, contact_and_boundary(row, of_seeds=True))
         return of_study(self.study, f"{contact_title(row, of_seeds=True)}, {grid_size([row])}")
 
-    @property
-    def p_star(self) -> float:
-        """Mean reduced pressure, which differs where another load is prescribed."""
-        return float(np.mean([row["p_star"] for row in self.rows]))
+    def mean_load(self, name: str) -> float:
+        """Mean "p_star" or "pressure"; the seeds differ in it where another load is prescribed."""
+        return float(np.mean([row[name] for row in self.rows]))
 
     @property
     def not_converged(self) -> str | None:

@@ -95,12 +95,13 @@ COMPARISON = (
     TableColumn("p ratio", ratio("p_star_persson_at_u_g", "p_star"), optional=True),
     STATUS,
 )
-EINSTEIN = (P_STAR, *(c for name in QUANTITIES for c in _beside_theory(name, "einstein")))
+EINSTEIN = (P_STAR, PRESSURE, *(c for name in QUANTITIES for c in _beside_theory(name, "einstein")))
 ON_GRIDS = "Values on the grid, not extrapolated."
 EINSTEIN_CAPTION = f"Comparison with the closed form for n = 0 and Gaussian heights. {ON_GRIDS}"
-CONTINUUM = (replace(P_STAR, error="p_star_error"), POINTS, *map(_continuum, QUANTITIES))
+CONTINUUM = (replace(P_STAR, error="p_star_error"), PRESSURE, POINTS, *map(_continuum, QUANTITIES))
 SEEDS = (
     replace(P_STAR, error="p_star_confidence"),
+    PRESSURE,
     *(
         TableColumn(quantity.heading, f"{name}_mean", error=f"{name}_confidence")
         for name, quantity in QUANTITIES.items()
@@ -113,6 +114,7 @@ BEST_VALUES = {
 """Columns by quantity: with continuum values where they are known, else with values on the grid."""
 TRUE_CONTACT = (
     P_STAR,
+    PRESSURE,
     AREA,
     TableColumn("whole surface\na_r", "a_r_persson", optional=True),
     TableColumn("\nratio", ratio("a_r", "a_r_persson"), optional=True),
@@ -173,7 +175,12 @@ def _of_dimension(dimension: int, value: Value) -> Callable[[Record], Any]:
 
 IN_TABLE = tuple(observable for observable in OBSERVABLES if observable.heading)
 """The observables that [output] turns on, without those that have a table of their own."""
-OPTIONAL_OBSERVABLES = (P_STAR, AREA, *(c for each in IN_TABLE for c in _columns_of(each)))
+OPTIONAL_OBSERVABLES = (
+    P_STAR,
+    PRESSURE,
+    AREA,
+    *(c for each in IN_TABLE for c in _columns_of(each)),
+)
 
 
 def warnings_in(rows: Sequence[Record]) -> list[str]:
@@ -267,7 +274,9 @@ def seeds_table(comparison: Comparison) -> Table:
         (
             f"{title}: mean of {len(ensemble.rows)} seeds",
             {
-                "p_star": ensemble.p_star,
+                **ensemble.rows[0],
+                "p_star": ensemble.mean_load("p_star"),
+                "pressure": ensemble.mean_load("pressure"),
                 "not_converged": ensemble.not_converged,
                 **ensemble.means(),
             },
@@ -279,15 +288,10 @@ def seeds_table(comparison: Comparison) -> Table:
         "With [accuracy] the values are those in the continuum, and the interval includes their "
         "mean error; otherwise they are those on the grid."
     )
-    means_shown = (
-        record[f"{name}_mean"]
-        for group in groups
-        for record in group.records
-        for name in QUANTITIES
-    )
-    if not all(map(known, means_shown)):
+    records = [record for group in groups for record in group.records]
+    if not all(known(record[f"{name}_mean"]) for record in records for name in QUANTITIES):
         caption += " A mean is left out where the continuum value of some seed is unknown."
-    return Table(caption, SEEDS, groups)
+    return Table(caption, shown(SEEDS, records), groups)
 
 
 def power_laws(comparison: Comparison) -> Table:

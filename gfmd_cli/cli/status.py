@@ -19,11 +19,13 @@ from gfmd_cli.cli.options import (
 )
 from gfmd_cli.errors import InputError, typed
 from gfmd_cli.status import Status, counted
-from gfmd_cli.units import count, duration
+from gfmd_cli.units import count, duration, left_out
 
 if TYPE_CHECKING:
     from gfmd_cli.study.checkpoint import SavedProgress
     from gfmd_cli.study.progress import StudyProgress
+
+MAX_TASKS = 40  # that have not converged, listed
 
 
 @click.command(cls=Command)
@@ -37,9 +39,10 @@ def status(
 ) -> None:
     """Show the progress of a study.
 
-    The output is the number of tasks by status, the errors that ended tasks, and the next command
-    to type. The command reads the study and its folder of unfinished work and changes nothing, so
-    it can be called at any time. It does not query the batch system. Example:
+    The output is the number of tasks by status, the tasks that have not converged, the errors that
+    ended tasks, and the next command to type. The command reads the study and its folder of
+    unfinished work and changes nothing, so it can be called at any time. It does not query the
+    batch system. Example:
 
         gfmd status configs/demo.toml --shards 4
     """
@@ -107,6 +110,13 @@ def _lines(progress: "StudyProgress", shards: int | None) -> list[str]:
                 f"  {name}: state of step {task.saved.step} ({task.saved.points} points along x), "
                 f"residual {task.saved.residual:.1e}, saved {duration(age)} ago"
             )
+    unconverged = [
+        f"task {task.task} {task.label}: {task.status}"
+        for task in progress.tasks
+        if task.status.is_solved and not task.status.is_converged
+    ]
+    listed = [*unconverged[:MAX_TASKS], *left_out(len(unconverged), MAX_TASKS, "task")]
+    lines += [f"  {line}" for line in listed]
     if progress.records:
         lines.append(f"  {count(progress.records, 'record')} not collected yet")
     if progress.others:

@@ -28,7 +28,7 @@ from gfmd_cli.maps.text_tables import (
     table_formats,
 )
 
-NO_GRID = "three columns that are not the points (x, y, height) of a full grid"
+NO_GRID = "three columns that are not the points (x, y, height) of a grid"
 MAX_DEVIATION = 0.05  # of positions, over their distance, beside their rounding; a choice
 MAX_ROUNDING = 0.25  # of positions, likewise: neighbours differ by 2 of the last digit; a choice
 SAME_POSITION = 0.0, 0.5
@@ -46,7 +46,7 @@ def read_points(file: BinaryIO) -> HeightMap | None:
     """Read a table of positions and heights; None for any other file.
 
     The columns are x, y and height, or x and height, unless the header names another order. Raises
-    InputError for points that are not those of a full grid, and for units that are not clear.
+    InputError for points that are not those of a grid, and for units that are not clear.
     """
     content = part(file) if "xyz" in table_formats(file) else b""
     if not content or content.startswith(OWN_HEADERS):
@@ -71,6 +71,12 @@ def read_points(file: BinaryIO) -> HeightMap | None:
         raise InputError("a position in the table is missing or infinite")
     table[np.abs(table[:, -1]) >= MAX_HEIGHT, -1] = np.nan  # a mark, in the unit of the file
     heights, sides, note = _grid(table) if count == 3 else _profile(table)
+    if count == 3 and heights.size > len(table) and not content.endswith((b"\n", b"\r")):
+        raise InputError(
+            f"the table lacks {heights.size - len(table)} of the {heights.shape[1]} x "
+            f"{heights.shape[0]} points of a grid, and its last line does not end with a line "
+            "break: if the file is not cut off, add one"
+        )
     *of_sides, of_heights = factors or [None] * count
     return HeightMap(
         heights=heights if of_heights is None else of_heights * heights,
@@ -115,10 +121,10 @@ def _are_points(table: Field) -> bool:
         steps = np.diff(table[:, 0])
         return bool(steps.size >= MIN_STEPS and (np.all(steps > 0) or np.all(steps < 0)))
     try:
-        _grid(table)
+        heights, _, _ = _grid(table)
     except InputError:
         return False
-    return True
+    return heights.size == len(table)  # a matrix can look like a grid with missing points
 
 
 def _is_numbered(table: Field) -> bool:
@@ -185,7 +191,10 @@ def _columns_in(text: str, count: int) -> tuple[list[str], list[str]]:
 
 
 def _grid(table: Field) -> tuple[Field, tuple[float, ...], str]:
-    """Heights [y, x] and sides of the points of a full grid. Raises InputError for other points."""
+    """Heights [y, x] and sides of the points of a grid, NaN at those that are missing.
+
+    Raises InputError for points that are not on a grid, or on one of which half is missing.
+    """
     positions = table[:, :2]
     candidates = []
     for same in SAME_POSITION:
@@ -199,7 +208,7 @@ def _grid(table: Field) -> tuple[Field, tuple[float, ...], str]:
         x, y = points[counts.argmax()].tolist()
         times = f": the point x = {x:g}, y = {y:g} is given {counts.max()} times"
         raise InputError(f"{NO_GRID}{times if counts.max() > 1 else ''}")
-    missing, shape, indices = min(candidates, key=lambda candidate: candidate[0])
+    _, shape, indices = min(candidates, key=lambda candidate: candidate[0])
     steps, deviation = _steps(positions, indices)
     if deviation.max() > MAX_DEVIATION:
         raise InputError(
@@ -207,12 +216,7 @@ def _grid(table: Field) -> tuple[Field, tuple[float, ...], str]:
             f"they deviate by up to {deviation.max():.2g} of their distance, and at most "
             f"{MAX_DEVIATION:g} is allowed: save them with more digits, or resample the map"
         )
-    if missing:
-        raise InputError(
-            f"{missing} of the {shape[1]} x {shape[0]} points of the grid are missing: add "
-            "their positions, with NaN as height"
-        )
-    heights = np.empty(shape)
+    heights = np.full(shape, np.nan)
     heights[indices[:, 1], indices[:, 0]] = table[:, 2]
     return heights, (float(steps[1] * shape[0]), float(steps[0] * shape[1])), ""
 
