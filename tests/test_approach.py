@@ -111,6 +111,14 @@ def test_the_highest_point_of_a_bump_is_its_top_wherever_it_lies(row):
     assert highest_point(3.0 * bump) == pytest.approx(3.0, rel=1e-9)
 
 
+def test_a_wide_peak_does_not_hide_a_narrow_one_that_is_higher_between_the_points():
+    x = np.arange(32)
+    wide = np.exp(-((x - 8) ** 2) / 8)
+    narrow = np.cos(2 * np.pi * np.outer(x - 20.125, np.arange(-15, 16)) / 32).sum(axis=1) / 31
+    heights = np.outer(wide, wide) + 1.02 * np.outer(narrow, narrow)
+    assert highest_point(heights) == pytest.approx(1.02, rel=1e-9)
+
+
 @pytest.mark.parametrize("shape", [(16, 16), (15, 16), (16, 20), (16,)], ids=str)
 def test_the_highest_point_of_a_map_with_nyquist_waves_is_that_of_finer_grids(shape):
     """Seen from all sides: a Nyquist wave stands for +q and -q alike."""

@@ -89,6 +89,14 @@ def test_the_edge_has_the_law_of_hertz(n, exponent):
         assert local == pytest.approx(exponent, abs=1e-9)
 
 
+def test_the_prefactors_are_those_of_the_density_and_not_of_its_means_over_bins():
+    n, power = 0.5, edge_exponent(0.5) + 1
+    shares = np.where(MIDDLE < 3, 3.0 * np.diff(EDGES**power) / power, 0.0)
+    rows = [row(n, points, shares * points**2, 0.3, 1e5) for points in (2**16, 2**17, 2**18)]
+    fitted = fit_power_law(distribution(rows), "small")
+    assert (fitted.prefactor, fitted.edge_prefactor) == pytest.approx((3.0, 3.0), rel=1e-6)
+
+
 @pytest.mark.parametrize("n", [0.0, 0.5, 1.0, 1.5, 2.5, 3.0])
 def test_the_density_of_hertz_is_that_of_the_points_of_its_profile(n):
     histogram = hertz_row(n, 2048, 0.3)["pr_sigma_log"]

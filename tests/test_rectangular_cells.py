@@ -128,6 +128,11 @@ def test_round_indenters_measure_distances_in_metres(points):
     assert np.array_equal(Punch(radius=0.3, **cell).heights(*points) == 0, r <= 0.3)
 
 
+def test_the_radius_of_a_punch_is_a_spacing_or_more_along_both_sides():
+    punch = Punch(radius=0.05, length=1.0, length_y=2.0)
+    assert (punch.smallest_grid(), punch.smallest_grid_y()) == (20, 40)
+
+
 def test_a_punch_without_rim_in_the_short_side_is_refused():
     with pytest.raises(ValueError, match=r"leaves no rim in a cell of 0\.4: less than 0\.2 is"):
         Punch(radius=0.25, length_y=0.4)

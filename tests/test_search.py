@@ -434,10 +434,11 @@ def test_a_load_that_no_pressure_has_fails_and_says_so(rows_of, load, reason):
     ("steps", "overrides"),
     [
         (37, ("elastomer.n=4", "load={contact_area=0.1}", "accuracy={mean_gap=0.1}")),
+        (15, ("elastomer.n=1", "load={contact_area=0.3}", "accuracy={mean_gap=0.1}")),
         (9, ("grid.points=64", f"load={{contact_area={409.4 / 64**2}, tolerance=1e-6}}")),
         (9, ("grid.points=64", f"load={{contact_area={409.6 / 64**2}, tolerance=1e-6}}")),
     ],
-    ids=["errors", "lower", "upper"],  # one of the latter solves the nearest contact again
+    ids=["errors", "slopes", "lower", "upper"],  # one of the last two solves the nearest again
 )
 def test_a_search_stopped_again_and_again_ends_bit_for_bit(rows_of, steps, overrides):
     check_stopped(rows_of, steps, overrides)

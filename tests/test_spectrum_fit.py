@@ -96,12 +96,14 @@ def test_standard_errors_hold_on_surfaces_that_the_fit_describes_exactly():
         assert relative_error == pytest.approx(fitted.q_r_error / fitted.q_r)
 
 
-def test_a_power_law_shows_no_roll_off():
+def test_a_power_law_shows_no_roll_off(tmp_path):
     surface = SelfAffine(spectrum="cutoff", rolloff=1.0, cutoff=0.02, hurst=0.7)
     fitted = fit(shells_of(surface, 128))
     assert fitted.q_r == 0
     assert fitted.hurst == pytest.approx(0.7, abs=1e-4)
     assert 2 * np.pi / fitted.q_s == pytest.approx(0.02, rel=5e-3)
+    random = suggested(fit_of_map(surface.heights(128), tmp_path, periodic=True))
+    assert (random.spectrum, random.rolloff) == ("cutoff", 1.0)  # its longest wave is the side
 
 
 def test_standard_errors_hold_on_gaussian_roughness():

@@ -189,6 +189,7 @@ def test_phases_are_even(seed):
     angles = phases(seed)
     assert angles.size > 15000
     assert kstest(angles, "uniform", args=(-np.pi, 2 * np.pi)).pvalue > 0.01
+    assert np.diff(np.sort(angles)).min() > 1e-11  # each has a random number of its own
 
 
 def test_phases_of_neighbouring_modes_and_seeds_are_independent():

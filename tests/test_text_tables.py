@@ -9,7 +9,7 @@ import pytest
 
 from gfmd_cli.errors import InputError
 from gfmd_cli.maps import text_tables
-from gfmd_cli.maps.text_tables import table_formats
+from gfmd_cli.maps.text_tables import shorter_or_longer_row, table_formats
 from gfmd_cli.maps.topography import read_topography
 from gfmd_cli.physics.file_surface import FileSurface
 
@@ -134,6 +134,10 @@ def test_a_row_of_a_matrix_with_another_length_is_named(tmp_path, row):
     path.write_bytes(b"\n".join(lines) + b"\n")
     with pytest.raises(InputError, match=f"line {row + 1} has 41 numbers, most rows 40"):
         read_topography(path)
+
+
+def test_rows_of_few_numbers_are_no_matrix():
+    assert shorter_or_longer_row(BytesIO(b"1 2\n3 4\n5 6 7\n")) == ""
 
 
 def test_a_matrix_that_is_cut_off_in_a_row_is_refused(tmp_path):

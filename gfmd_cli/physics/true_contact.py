@@ -65,7 +65,7 @@ def direction(grid: Grid, axis: int, rows: slice) -> Field:
 
     Also zero where the component is the highest wavenumber of the grid, which has no sign.
     """
-    x = np.arange(*grid.span, dtype=np.float64)
+    x = np.arange(*grid.span)
     y = np.fft.fftfreq(grid.points_y, 1 / grid.points_y)[rows, None]
     wave = x[rows] if grid.dimension == 1 else (y, x)[axis]
     points, side = grid.whole_shape[axis], grid.sides[axis]
