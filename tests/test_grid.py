@@ -236,8 +236,8 @@ def test_blocks_of_columns_of_zeros_are_not_transformed(monkeypatch, kept):
     field = grid.field_of_work(kept=kept)
     np.testing.assert_allclose(field, np.fft.irfft2(modes, field.shape) * grid.size, atol=1e-11)
     starts = [columns.part.start for columns in grid._transforms.along_columns.blocks]
-    assert transformed == [start for start in starts if start < kept]
-    assert len(starts) > 3
+    assert sorted(transformed) == [start for start in starts if start < kept]
+    assert len(starts) > 2
 
 
 def test_the_operator_on_a_line_is_the_convolution_with_its_kernel():
