@@ -8,6 +8,8 @@ PREFIXED = ("m", "Pa", "N/m")
 DIGITS = 12  # of a number in a label, so that different parameters have different labels
 LARGEST_RMS_HEIGHT = 1e-2
 """Largest rms height of a rough solid [m]; larger ones are in reduced units. A choice."""
+SCALE_RANGE = 1e-100, 1e100
+"""Allowed lengths [m] and stresses [Pa]: sums of squares over a spectrum are normal numbers."""
 DURATIONS = (("d", 86400), ("h", 3600), ("min", 60), ("s", 1))
 
 

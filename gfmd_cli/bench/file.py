@@ -17,7 +17,7 @@ from gfmd_cli.status import Status
 from gfmd_cli.study.column import Column
 from gfmd_cli.study.columns import BENCH
 from gfmd_cli.study.provenance import origin
-from gfmd_cli.study.reading import DAMAGE, check_column
+from gfmd_cli.study.reading import DAMAGE, check_column, damage_named
 from gfmd_cli.study.writing import write_column
 
 BENCH_LAYOUT = 1
@@ -113,15 +113,11 @@ def read_bench(path: Path) -> list[Trace]:
     """
     if not path.exists():
         raise InputError(f"{path}: no such bench file")
-    try:
-        with open_hdf5(path) as file:
-            if file.attrs.get(BENCH) != BENCH_LAYOUT:
-                raise StudyError(f"{path}: not a bench file of layout {BENCH_LAYOUT}")
-            runs = find(file, "runs")
-            return [_read_trace(find(runs, str(number))) for number in range(len(runs))]
-    except DAMAGE as error:
-        reason = getattr(error, "strerror", None) or error
-        raise StudyError(f"{path}: not a readable bench file, or damaged: {reason}") from error
+    with damage_named(path, "bench file"), open_hdf5(path) as file:
+        if file.attrs.get(BENCH) != BENCH_LAYOUT:
+            raise StudyError(f"{path}: not a bench file of layout {BENCH_LAYOUT}")
+        runs = find(file, "runs")
+        return [_read_trace(find(runs, str(number))) for number in range(len(runs))]
 
 
 def _read_trace(group: Any) -> Trace:

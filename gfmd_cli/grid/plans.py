@@ -185,7 +185,7 @@ def _key(make: Callable[[Planner], Any]) -> str:
 def _by_wisdom(texts: list[str], make: Callable[[Planner], T], fftw: Planner) -> T:
     """The transforms that `make` plans, from their wisdom. Raises RuntimeError if it lacks one."""
     pyfftw.forget_wisdom()
-    # the import of a text takes 0.25 ms, even if it has no plans, which are in brackets
+    # Importing a text takes 0.25 ms. One without plans, each of which is in brackets, is left out.
     double, single = (text.encode() if text.count("(") > 1 else b"" for text in texts)
     pyfftw.import_wisdom((double, single, b""))  # third: of long double
     return make(partial(fftw, flags=(_effort(), "FFTW_WISDOM_ONLY")))

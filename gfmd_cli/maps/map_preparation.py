@@ -127,7 +127,7 @@ def fill_missing(
     spacing : distance of the points along each axis, in any unit
     periodic : whether points at opposite edges are neighbours
     """
-    weights = np.resize(min(spacing) / np.array(spacing), 2) ** 2  # of the axes of two
+    weights = np.resize(min(spacing) / np.array(spacing), 2) ** 2  # of both axes; a profile has one
     filled = _filled(np.atleast_2d(heights), np.atleast_2d(missing), weights, periodic)
     return filled.reshape(heights.shape)
 

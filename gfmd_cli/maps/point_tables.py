@@ -193,7 +193,7 @@ def _columns_in(text: str, count: int) -> tuple[list[str], list[str]]:
 def _grid(table: Field) -> tuple[Field, tuple[float, ...], str]:
     """Heights [y, x] and sides of the points of a grid, NaN at those that are missing.
 
-    Raises InputError for points that are not on a grid, or on one of which half is missing.
+    Raises InputError for points that are not on a grid, or on one of which they are less than half.
     """
     positions = table[:, :2]
     candidates = []

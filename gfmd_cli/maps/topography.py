@@ -33,10 +33,10 @@ from gfmd_cli.maps.microscope_files import (
 )
 from gfmd_cli.maps.text_tables import MATRIX_COLUMNS, UTF_16
 from gfmd_cli.spec_table import SpecTable
+from gfmd_cli.units import SCALE_RANGE
 
 MANY_POINTS = 8  # along one axis; a choice: no map has so many beside so few rows or columns
 SPACING_TOLERANCE = 1e-6  # relative: files store sides in single precision or with six digits
-SPACING_RANGE = 1e-100, 1e100  # a choice, also of the scales of a contact: squares stay in range
 AXES = ("y", "x")
 
 Interval = Annotated[tuple[Annotated[float, Key(ge=0)], float], Strict(False)]
@@ -248,7 +248,7 @@ def _spacing(data: HeightMap, shape: tuple[int, ...]) -> tuple[float, ...] | Non
     if data.sides is None:
         return None
     steps = [side / points for side, points in zip(data.sides, shape, strict=True)]
-    low, high = SPACING_RANGE
+    low, high = SCALE_RANGE
     if not all(low <= step <= high for step in steps):
         raise InputError(
             f"the sides of the map are {data.sides}; they must be positive, and spacings from "

@@ -16,8 +16,7 @@ from gfmd_cli.physics.linear_elastomer import LinearElastomer
 from gfmd_cli.physics.persson import shells
 from gfmd_cli.physics.surfaces import sample
 from gfmd_cli.physics.waves import radial_power
-
-SCALE_RANGE = (1e-100, 1e100)  # [m, Pa]: squared, over all of the spectrum, still normal numbers
+from gfmd_cli.units import SCALE_RANGE
 
 
 def build_scene(

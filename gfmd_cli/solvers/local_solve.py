@@ -38,8 +38,8 @@ residual itself may be larger (docs/solver_measurements.md)."""
 TARGET_FRACTION = 0.5  # of the tolerance, for that residual after the next solve; a choice
 MAX_ROUNDING = sqrt(1 - ACCEPTED_FRACTION**2) / ROUNDING_MARGIN
 """Fraction of the tolerance: largest rounding of a state whose residual is accepted. Here of the
-last evaluation, in single precision; in `nested_grids` of the start of an iteration. As if residual
-and rounding were independent; where they are not, the state is computed afresh (`is_certain`)."""
+last evaluation, in single precision; in `nested_grids` of the start of an iteration. The
+squares of residual and rounding add if they are independent; if not, sigma is computed afresh."""
 MAX_GROWTH = 1.5  # of the number of tiles in an evaluation that may be the last one; a choice
 MAX_EVALUATIONS = 6  # of the displacement at all points; a choice
 MAX_STEPS = 60  # on the same tiles; a choice

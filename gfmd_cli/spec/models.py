@@ -24,8 +24,8 @@ from gfmd_cli.spec_table import Positive, SpecTable
 MAX_VALUES = 100_000  # of one list or ladder; upper limit, guards against typing errors
 MAX_DECADES = 300.0  # of which a power of ten does not overflow
 LADDER_ROUNDINGS = 8  # of a power of ten, by which a value of the ladder may lie above `to`
-OF_OTHERS = {".csv", ".nc", ".vti", ".html", ".json", ".toml"}
-"""Suffixes of files that other commands write or read."""
+NO_STUDY = {".csv", ".nc", ".vti", ".html", ".json", ".toml"}
+"""Suffixes that a study cannot have: those of other files that commands write or read."""
 SWEPT = ("surface", "elastomer", "grid", "solver")
 REPEATED = (*SWEPT, "sweep")  # tables that may be given several times
 
@@ -354,7 +354,7 @@ class Spec(SpecTable):
 
     def study_path(self, output: Path | None = None) -> Path:
         """The study file, or `output`. Raises InputError for a suffix of files of another kind."""
-        if output is not None and output.suffix.lower() in OF_OTHERS:
+        if output is not None and output.suffix.lower() in NO_STUDY:
             raise InputError(
                 f"{output}: a study is an HDF5 file, such as {output.stem}.h5; gfmd export writes "
                 "CSV, netCDF and VTK, gfmd report HTML"

@@ -223,13 +223,13 @@ def _check_alike(place: str, datasets: Mapping[str, Any], dimensions: int) -> No
 
 
 @contextmanager
-def damage_named(source: Path) -> Iterator[None]:
-    """Inside, what HDF5 and NumPy raise of a damaged study is a StudyError that names it."""
+def damage_named(source: Path, kind: str = "study") -> Iterator[None]:
+    """Inside, what HDF5 and NumPy raise of a damaged file is a StudyError that names it."""
     try:
         yield
     except DAMAGE as error:
         reason = getattr(error, "strerror", None) or error
-        raise StudyError(f"{source}: not a readable study, or damaged: {reason}") from error
+        raise StudyError(f"{source}: not a readable {kind}, or damaged: {reason}") from error
 
 
 @contextmanager

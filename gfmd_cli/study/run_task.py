@@ -113,8 +113,10 @@ class TaskWatcher(Watcher):
         if grid.whole:  # else this process has a part of the contact
             a_r = float(contact_points(contact.obstacle, state.u, state.sigma).mean())
         numbers = grid.points, state.step, state.residual, a_r
-        step = Progress(task.index, "step", task.label, *numbers)
-        self.context.report(step._replace(size=grid.size, p_star=contact.pressure))
+        step = Progress(
+            task.index, "step", task.label, *numbers, size=grid.size, p_star=contact.pressure
+        )
+        self.context.report(step)
 
 
 def attempt(task: Task, parts: Path, context: SolveContext) -> Status:

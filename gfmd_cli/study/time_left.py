@@ -30,7 +30,7 @@ class _Running:
     """First residual on that grid."""
     last: float = float("nan")
     p_star: float = float("nan")
-    """Reduced pressure, which a load in other units has only on a surface."""
+    """Reduced pressure; of a load in Pa it is known only once the surface is prepared."""
 
 
 class RemainingTime:
@@ -103,9 +103,9 @@ class RemainingTime:
         """Remaining seconds of a running task."""
         task, state, now = self.tasks[index], self.running[index], self.now()
         spent = now - state.started
-        # The ratio of an elastomer has the pressures of its tasks, where the forecast has not.
-        is_known = task.elastomer not in self.forecast and isfinite(state.p_star)
-        forecast = task.seconds_at(state.p_star) if is_known else task.seconds
+        # once a task of the elastomer has ended, the ratio accounts for the pressure
+        needs_pressure = task.elastomer not in self.forecast and isfinite(state.p_star)
+        forecast = task.seconds_at(state.p_star) if needs_pressure else task.seconds
         forecast *= self._speed_ratio(task.elastomer)
         left = max(forecast - spent, MIN_REMAINING_SHARE * spent)
         if state.size == task.size and isfinite(state.first) and state.last > 0:
