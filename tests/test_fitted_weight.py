@@ -55,8 +55,6 @@ def test_the_weight_rises_with_both_areas(n):
     p = np.geomspace(1e-6, 40, 200)
     assert np.all(np.diff(theory.mean_gap(p)) <= 0)
     assert float(theory.mean_gap(0.0)) == np.inf
-    flat = FittedWeight(Shells(*np.empty((6, 0))), np.empty(0))
-    assert np.all(flat.mean_gap(p) == 0)
 
 
 def test_springs_have_nearly_their_closed_form():

@@ -94,8 +94,6 @@ def test_ends_and_shapes():
     assert some < light < np.inf
     assert heavy == 0
     assert float(theory.pressure_at_gap(some)) == pytest.approx(p[1, 0], rel=1e-4)
-    flat = CoarseGrained(Shells(*np.empty((6, 0))))
-    assert np.all(flat.mean_gap(p) == 0)
 
 
 def test_the_gap_of_a_half_space_is_that_of_simulations():

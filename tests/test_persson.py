@@ -192,17 +192,6 @@ def test_an_unknown_pressure_has_no_prediction():
     assert few.contact_area(0.0) == 0.0
 
 
-def test_a_flat_surface_is_in_full_contact():
-    zero, one = np.zeros(5), np.ones(5)
-    flat = Persson(shells(one, zero, one, one, one))
-    p = np.array([0.0, 1.0])
-    assert flat.shells.q.size == 0
-    assert flat.delta_sigma == 0
-    assert np.all(flat.contact_area(p) == [0, 1])
-    assert np.all(flat.mean_gap(p) == 0)
-    assert np.all(flat.stress_deviation(p) == 0)
-
-
 def test_the_shells_keep_every_sum_and_separate_the_longest_waves(monkeypatch):
     monkeypatch.setattr(persson, "EXACT_SHELLS", 20)
     monkeypatch.setattr(persson, "LOGARITHMIC_BINS", 30)

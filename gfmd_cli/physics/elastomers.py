@@ -427,8 +427,8 @@ def _end_exponents(table: Field) -> tuple[float, float]:
 
 
 def _fraction(variance: Field, chosen: Mask) -> float:
-    """Fraction of a variance at chosen wavenumbers; zero for a flat surface, which has none."""
-    return float(variance[chosen].sum() / variance.sum()) if variance.size else 0.0
+    """Fraction of a variance at chosen wavenumbers."""
+    return float(variance[chosen].sum() / variance.sum())
 
 
 Elastomer = Annotated[

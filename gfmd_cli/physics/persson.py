@@ -80,20 +80,17 @@ class Shells:
 def shells(q: Field, power: Field, k: Field, gamma: Field, modes: Field) -> Shells:
     """Bin the modes of a surface: exact shells at long wavelengths, then logarithmic bins.
 
-    Paper Sect. 4.1.1 (with 500 bins). Empty bins are dropped; a flat surface has no bins at all.
+    Paper Sect. 4.1.1 (with 500 bins). Empty bins are dropped.
 
     Parameters
     ----------
     q : |q| > 0 of every mode [1/m], shape (modes,)
-    power : |h(q)|^2 times the multiplicity of the mode [m^2], shape (modes,)
+    power : |h(q)|^2 times the multiplicity of the mode [m^2], shape (modes,); not zero for all
     k : stiffness k(q) [Pa/m], shape (modes,)
     gamma : weight gamma(q) of Eq. (30), shape (modes,)
     modes : number of modes that an entry represents, shape (modes,)
     """
-    carries_power = power > 0
-    if not np.any(carries_power):
-        return Shells(*np.empty((6, 0)))
-    edges = bin_edges(q[carries_power])
+    edges = bin_edges(q[power > 0])
     sums = np.zeros((6, edges.size + 1))
     for start in range(0, q.size, _CHUNK):
         part = slice(start, start + _CHUNK)
@@ -156,7 +153,7 @@ class Persson:
 
         Parameters
         ----------
-        sigma, p : stress and pressure, shapes that broadcast; the surface must not be flat
+        sigma, p : stress and pressure, shapes that broadcast
         """
         width = self.delta_sigma
         x, y = np.maximum(sigma, 0.0) / width, np.asarray(p) / width
@@ -170,10 +167,7 @@ class Persson:
 
         Its square, paper Eq. (26) times Delta_sigma^2, is the integral of a_r over the variance.
         """
-        p = np.asarray(p, dtype=np.float64)
-        if not self.shells.variance.size:
-            return np.zeros_like(p)
-        return np.sqrt(_resolved_variance(p, self.delta_sigma**2))
+        return np.sqrt(_resolved_variance(np.asarray(p), self.delta_sigma**2))
 
     def weight_slopes(self, a_q: Field, a_s: Field) -> tuple[Field, Field]:
         """Derivatives by a_q and a_s of W = gamma a_q + (1 - gamma) a_q^3, weight of the energy.
@@ -201,12 +195,10 @@ class Persson:
         p : pressure >= 0, any shape
         """
         p = np.asarray(p, dtype=np.float64)
-        if not self.shells.variance.size:
-            return np.zeros_like(p)
         return np.where(p > 0, self._finite_gap(p), np.where(np.isnan(p), np.nan, np.inf))
 
     def _finite_gap(self, p: Field) -> Field:
-        """Mean gap of a rough surface, of any value where p = 0."""
+        """Mean gap, of any value where p = 0."""
         edges = _panel_edges(p[p > 0], self.delta_sigma)
         ends = np.log(edges)[:, None]
         centre, half = 0.5 * (ends[1:] + ends[:-1]), 0.5 * (ends[1:] - ends[:-1])
@@ -251,9 +243,8 @@ class Persson:
         return rising, monotone_cubic(rising, np.log(p[known]))
 
     def _reduced(self, p: Field | float) -> Field:
-        """p / sqrt(2) Delta_sigma; a flat surface is in full contact under any pressure."""
-        with np.errstate(divide="ignore", invalid="ignore"):
-            return np.where(np.asarray(p) <= 0, 0.0, p / np.float64(np.sqrt(2) * self.delta_sigma))
+        """p / sqrt(2) Delta_sigma."""
+        return np.asarray(p) / (np.sqrt(2) * self.delta_sigma)
 
     def _energy_slope(self, p: Field) -> Field:
         """dv/dp, of the shape of p. Paper Eqs. (29) and (30)."""
