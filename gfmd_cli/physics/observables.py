@@ -60,11 +60,9 @@ def estimated_patches(perimeter: float, a_r: float, area: float) -> float:
 
 def border_contact(grid: Grid, mask: Mask) -> float:
     """Fraction of the outermost points of a map that a mask contains."""
-    inner = [slice(1, -1)] * mask.ndim
-    if grid.dimension == 2:  # of the rows of this process
-        first, last = grid.row_span
-        inner[0] = slice(int(first == 0), len(mask) - int(last == grid.points_y))
-    inside = mask[tuple(inner)]
+    first, last = grid.row_span
+    inner_rows = slice(int(first == 0), len(mask) - int(last == grid.points_y))
+    inside = mask[(inner_rows, slice(1, -1))[: mask.ndim]]
     counts = [np.count_nonzero(mask) - np.count_nonzero(inside), mask.size - inside.size]
     touching, outermost = grid.total(np.array(counts))
     return float(touching / outermost)

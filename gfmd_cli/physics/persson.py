@@ -114,17 +114,13 @@ def bin_edges(q: Field) -> Field:
 
 
 def _smallest_distinct(q: Field, count: int) -> Field:
-    """The `count` smallest different values in rising order, or all; reorders q in place."""
-    size = 4 * count  # a first guess of how many modes these shells hold
-    while True:
-        whole = size >= q.size
-        if not whole:
-            q.partition(size)
-        low = np.sort(q[:size])
+    """The `count` smallest different values in rising order, or all."""
+    for size in (4 * count, q.size):  # rarely do more modes than the first have so few values
+        low = np.sort(np.partition(q, size)[:size] if size < q.size else q)
         distinct: Field = low[np.append(True, np.diff(low) > _SAME_SHELL * low[1:])]
-        if whole or distinct.size >= count:
-            return distinct[:count]
-        size *= 4
+        if distinct.size >= count:
+            break
+    return distinct[:count]
 
 
 @dataclass(frozen=True, eq=False)

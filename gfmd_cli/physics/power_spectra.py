@@ -29,7 +29,7 @@ def spectra(grid: Grid, fields: Mapping[str, Field]) -> tuple[Field, Field, dict
     point = np.zeros(grid.shape)
     point.flat[0] = grid.size  # every wave of a single point has |f(q)| = 1
     m, count, _ = radial_power(grid, point)
-    edges = bin_edges(m.copy())
+    edges = bin_edges(m)
 
     def binned(at: Field, values: Field) -> Field:
         return np.asarray(np.bincount(np.searchsorted(edges, at), values, edges.size + 1), float)

@@ -60,13 +60,10 @@ def spectrum(shells: Shells, sides: tuple[float, ...], points: tuple[int, ...]) 
         except InputError as error:
             no_fit = str(error)
     edges = _edges(shells.q, nyquist)
-    place = np.searchsorted(edges, shells.q) - 1
-    inside = (place >= 0) & (place < edges.size - 1)
+    place = np.searchsorted(edges, shells.q)  # 0 and edges.size are outside
     fitted = nearest.density(shells.q) * shells.modes if nearest else np.zeros_like(shells.q)
     weights = (shells.height, shells.height * shells.q, shells.modes, fitted)
-    sums = np.array(
-        [np.bincount(place[inside], weight[inside], edges.size - 1) for weight in weights], float
-    )
+    sums = np.array([np.bincount(place, each, edges.size + 1)[1:-1] for each in weights])
     total, moment, modes, fitted = sums[:, sums[0] > 0]
     per_mode = prod(sides) / modes
     return Spectrum(moment / total, total * per_mode, modes, fitted * per_mode, nearest, no_fit)

@@ -44,15 +44,13 @@ class Texture(NamedTuple):
 def texture(grid: Grid, height: Field) -> Texture:
     """The texture of a surface. The cost is one transform."""
     modes = grid.forward_into_work(height)
-    has_nyquist_waves = _has_nyquist_waves(grid, modes)
-    if grid.dimension == 1:
-        numbers = np.flatnonzero(_occupied(_power(grid, modes)))
-        tiles = max(int(np.gcd.reduce(numbers)), 1)
-        return Texture(inf, 1.0, tiles, _line_mirrors(grid, modes), 1.0, has_nyquist_waves)
-    power, mirrors = _power(grid, modes), _mirrors(grid, modes)
+    has_nyquist_waves, power = _has_nyquist_waves(grid, modes), _power(grid, modes)
     # of m tiles along an axis, only every m-th mode is not zero
     modes_along = [np.flatnonzero(_occupied(power).any(axis=axis)) for axis in range(2)]
     tiles = prod(max(int(np.gcd.reduce(numbers)), 1) for numbers in modes_along)
+    if grid.dimension == 1:
+        return Texture(inf, 1.0, tiles, _line_mirrors(grid, modes), 1.0, has_nyquist_waves)
+    mirrors = _mirrors(grid, modes)
     repetitions = _concentration(grid, power) / (tiles * MIRRORED_CONCENTRATION[mirrors])
     return Texture(*_directions(grid, modes), tiles, mirrors, repetitions, has_nyquist_waves)
 
