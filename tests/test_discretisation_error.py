@@ -612,6 +612,23 @@ def test_the_excess_of_a_power_law_has_its_exponent():
     assert excess_exponent(Power(n=2), 32, 1.0) == (2.0, pytest.approx(0.0, abs=1e-12))
 
 
+def test_a_table_that_ends_steeply_beyond_the_grid_has_no_area_in_the_continuum(tmp_path):
+    """Its k(q) overflows within a few octaves; the area in the continuum was 0."""
+    path = tmp_path / "steep.txt"
+    np.savetxt(path, [[1, 1], [300, 300], [300.1, 360]])
+    assert excess_exponent(Tabulated(path=path), 64, 1.0).value == inf
+    spec = {
+        "surface": {"kind": "self-affine", "cutoff": 0.125},
+        "elastomer": {"kind": "table", "path": str(path)},
+        "grid": {"points": 64},
+        "load": {"p_star": 0.1},
+        "accuracy": {"contact_area": 0.5},
+    }
+    row = solve(spec).columns
+    assert row["a_r_verdict"] == "unknown"
+    assert isnan(row["a_r_continuum"])
+
+
 def measured(surface, elastomer, pressure, points):
     """Values of a contact at a pressure in Pa, in the units Pa and m."""
     scene = build_scene(surface, elastomer, points)

@@ -260,7 +260,9 @@ def excess_exponent(elastomer: LinearElastomer, points: float, length: float) ->
     next coarser scale.
     """
     highest = pi * points / length * 2.0**OCTAVES
-    exponents = np.maximum(elastomer.local_exponent(highest, length, HALF_OCTAVE), 0.0)
+    with np.errstate(over="ignore", invalid="ignore"):  # k beyond a table that ends steeply
+        exponents = elastomer.local_exponent(highest, length, HALF_OCTAVE)
+    exponents = np.maximum(np.nan_to_num(exponents, nan=inf, posinf=inf), 0.0)
     weights = 0.5 ** np.minimum(OCTAVES[1:] + 1, OCTAVES[-1])
     mean = float(weights @ exponents[1:])
     return ExcessExponent(round(mean, 12), EXPONENT_CHANGE * abs(float(exponents[0]) - mean))
