@@ -41,10 +41,9 @@ def gamma_n(n: Field | float) -> Field:
     Raises ValueError for n outside [0, 4].
     """
     exponent = np.asarray(n, dtype=np.float64)
-    nodes = np.array(list(_GAMMA))
+    nodes, values = np.array(list(_GAMMA.items())).T
     if np.any((exponent < nodes[0]) | (exponent > nodes[-1])):
         raise ValueError(f"gamma_n is known for 0 <= n <= 4, got n = {n}")
-    values = np.array(list(_GAMMA.values()))
     if np.isin(exponent, nodes).all():
         return values[np.searchsorted(nodes, exponent)]
     return monotone_cubic(nodes, values)(exponent)
