@@ -300,10 +300,10 @@ def estimate(
     fine, _, n = grids
     excess = area_exponent or ExcessExponent(n)
     is_free, is_rough = fine.border is not None, scales is not None
+    has_flat_top = scales is not None and scales.has_steep_flat_top
     if fine.a_r == 0:
         return unknown()
     if is_free:
-        has_flat_top = scales is not None and scales.has_steep_flat_top
         estimates = estimate_free(
             grids, full_contact_errors, same_waves=same_waves, has_flat_top=has_flat_top
         )
@@ -312,13 +312,13 @@ def estimate(
     elif fine.a_r == 1 and not is_rough:
         return unknown()
     else:
-        estimates = _estimate_periodic(grids, scales, tip)
+        estimates = estimate_by_change(grids, has_flat_top=has_flat_top)
+        if scales is None or _laws_hold(grids, scales):
+            estimates |= {"sigma_p": _stress(grids, scales, tip), "u_g": _gap(grids, scales, tip)}
     if is_rough or not is_free:
-        area = _area_of_any_surface(estimates["a_r"], grids, scales, excess, tip)
-        estimates = estimates | {"a_r": area}
+        estimates["a_r"] = _area_of_any_surface(estimates["a_r"], grids, scales, excess, tip)
     if tip.dimension == 1 and (is_rough or is_free) and estimates["u_g"].verdict.has_error:
-        error = _error_of_gaps(fine)
-        estimates = estimates | {"u_g": with_independent_error(estimates["u_g"], error)}
+        estimates["u_g"] = with_independent_error(estimates["u_g"], _error_of_gaps(fine))
     if fine.a_r == 1 and not same_waves:  # the grids agree and have no contact line
         estimates = {
             name: with_independent_error(each, full_contact_errors[name])
@@ -327,24 +327,12 @@ def estimate(
     if stepped:
         return estimates | {"sigma_p": border_stress(grids)}
     if tip.is_sharp and tip.dimension == 1 and n > MAX_RIDGE_EXPONENT:
-        estimates = estimates | {"a_r": UNKNOWN}
+        estimates["a_r"] = UNKNOWN
     is_undecided = estimates["sigma_p"].verdict != Verdict.DIVERGES
     if is_undecided and tip.stress_order(n) < MIN_STRESS_ORDER and n < DIVERGENT:
         verdict = Verdict.SLOW if tip.stress_order(n) > 0 else Verdict.DIVERGES
         return estimates | {"sigma_p": replace(UNKNOWN, verdict=verdict)}
     return estimates
-
-
-def _estimate_periodic(
-    grids: NestedGrids, scales: RoughnessScales | None, tip: Tip
-) -> dict[str, Estimate]:
-    """Estimates with a periodic boundary; that of the area is from the change alone."""
-    if scales is not None and not _laws_hold(grids, scales):
-        return estimate_by_change(grids, has_flat_top=scales.has_steep_flat_top)
-    return estimate_by_change(grids) | {
-        "sigma_p": _stress(grids, scales, tip),
-        "u_g": _gap(grids, scales, tip),
-    }
 
 
 def _laws_hold(grids: NestedGrids, scales: RoughnessScales) -> bool:

@@ -204,9 +204,8 @@ def estimate_free(
     if coarse is not None and n <= MAX_FREE_EXPONENT:
         estimates = _by_change(grids, FREE_GAP_FACTOR, has_flat_top=has_flat_top)
     if fine.a_r == 1 and same_waves:
-        estimates |= {
-            name: full_contact(fine, full_contact_errors)[name] for name in ("a_r", "u_g")
-        }
+        exact = full_contact(fine, full_contact_errors)
+        estimates |= {name: exact[name] for name in ("a_r", "u_g")}
     if fine.border:
         estimates["sigma_p"] = border_stress(grids)
     return estimates
@@ -223,11 +222,10 @@ def border_stress(grids: NestedGrids) -> Estimate:
 
 def _by_change(grids: NestedGrids, gap_factor: float, *, has_flat_top: bool) -> dict[str, Estimate]:
     is_steep = has_flat_top and grids.n > MAX_FLAT_TOP_EXPONENT
+    factor = FLAT_TOP_FACTOR if is_steep else FACTOR["sigma_p"]
     return {
         "a_r": _area(grids),
-        "sigma_p": _value_by_change(
-            "sigma_p", grids, FLAT_TOP_FACTOR if is_steep else FACTOR["sigma_p"]
-        ),
+        "sigma_p": _value_by_change("sigma_p", grids, factor),
         "u_g": _value_by_change("u_g", grids, gap_factor),
     }
 

@@ -417,3 +417,6 @@ class Wave(LineIndenter):
 
     def _profile(self, r: Field) -> Field:
         return self.amplitude * np.cos(2 * np.pi * r / self.length)
+
+
+Indenter = Parabola | PowerLawIndenter | Cone | Punch | Ridge | LineParabola | Wave

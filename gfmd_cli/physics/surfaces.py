@@ -14,30 +14,10 @@ from gfmd_cli.grid.distributed import create_grid
 from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.grid.ranks import Ranks
 from gfmd_cli.physics.file_surface import FileSurface
-from gfmd_cli.physics.indenters import (
-    Cone,
-    LineParabola,
-    Parabola,
-    PowerLawIndenter,
-    Punch,
-    Ridge,
-    RigidSurface,
-    Wave,
-)
+from gfmd_cli.physics.indenters import Indenter, RigidSurface
 from gfmd_cli.physics.self_affine import SelfAffine
 
-Surface = Annotated[
-    SelfAffine
-    | Parabola
-    | PowerLawIndenter
-    | Cone
-    | Punch
-    | Ridge
-    | LineParabola
-    | Wave
-    | FileSurface,
-    Key(discriminator="kind"),
-]
+Surface = Annotated[SelfAffine | Indenter | FileSurface, Key(discriminator="kind")]
 
 
 def sample(

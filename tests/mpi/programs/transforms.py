@@ -12,9 +12,9 @@ from gfmd_cli.grid.halo import DistributedRows
 from gfmd_cli.grid.ranks import Ranks
 from gfmd_cli.physics.contact import Contact
 from gfmd_cli.physics.elastomers import Power
+from gfmd_cli.physics.indenters import Cone
 from gfmd_cli.physics.scenes import build_scene
 from gfmd_cli.physics.self_affine import SelfAffine
-from gfmd_cli.physics.surfaces import Cone
 from gfmd_cli.physics.waves import texture
 from gfmd_cli.solvers.contact_state import PRESSED
 from gfmd_cli.solvers.multigrid import Multigrid
