@@ -320,10 +320,8 @@ def estimate(
     if tip.dimension == 1 and (is_rough or is_free) and estimates["u_g"].verdict.has_error:
         estimates["u_g"] = with_independent_error(estimates["u_g"], _error_of_gaps(fine))
     if fine.a_r == 1 and not same_waves:  # the grids agree and have no contact line
-        estimates = {
-            name: with_independent_error(each, full_contact_errors[name])
-            for name, each in estimates.items()
-        }
+        for name, error in full_contact_errors.items():
+            estimates[name] = with_independent_error(estimates[name], error)
     if stepped:
         return estimates | {"sigma_p": border_stress(grids)}
     if tip.is_sharp and tip.dimension == 1 and n > MAX_RIDGE_EXPONENT:
