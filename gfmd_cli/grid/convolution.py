@@ -46,7 +46,7 @@ class PaddedTransform:
     def __post_init__(self) -> None:
         self.field_rows, self.field_columns = (1, *self.shape)[-2:]
         self.padded_rows, self.padded_columns = (1, *self.padded)[-2:]
-        self.real = np.dtype(np.float64 if self.precision == "double" else np.float32)
+        self.real = np.dtype(self.precision)
         self.own_rows, self.span = self.field_rows, (0, self.padded_columns // 2 + 1)
         if self.transposition is not None:
             self.own_rows, self.span = self.transposition.row_count, self.transposition.span

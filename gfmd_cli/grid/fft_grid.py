@@ -54,12 +54,12 @@ class Grid:
     @property
     def real(self) -> "np.dtype[np.floating[Any]]":
         """Type of the values of a field."""
-        return np.dtype(np.float64 if self.precision == "double" else np.float32)
+        return np.dtype(self.precision)
 
     @property
     def _complex(self) -> "np.dtype[np.complexfloating[Any, Any]]":
         """Type of Fourier coefficients."""
-        return np.dtype(np.complex128 if self.precision == "double" else np.complex64)
+        return np.result_type(self.real, np.complex64)
 
     @property
     def whole_shape(self) -> Shape:

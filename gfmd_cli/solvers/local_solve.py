@@ -211,10 +211,10 @@ class LocalSolve:
             curvature = dot(move, change)
             best = -dot(move, gap) / curvature if curvature > 0 else 1.0
             exact = not is_clipped and (best <= 1 or float((s + best * move).min()) >= 0)
-            choice = choose(best, exact)
-            length *= choice.factor
-            if choice.restart:
+            fraction, factor, restart = choose(best, exact)
+            length *= factor
+            if restart:
                 slope = 0.0
-            s = np.maximum(s + choice.fraction * move, 0.0)
-            w += choice.fraction * change
+            s = np.maximum(s + fraction * move, 0.0)
+            w += fraction * change
         self.s = s
