@@ -12,11 +12,10 @@ from typing import Any
 from weakref import proxy
 
 import numpy as np
-import pyfftw
 
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.grid.fft_grid import Grid, Shape
-from gfmd_cli.grid.halo import HALO_ROWS, DistributedRows, is_distributable
+from gfmd_cli.grid.halo import DistributedRows, is_distributable
 from gfmd_cli.grid.ranks import Ranks, is_root
 from gfmd_cli.grid.transposition import Span, Transposition
 
@@ -52,7 +51,11 @@ class DistributedGrid(Grid):
     def rows(self) -> DistributedRows:
         """The rows of this process."""
         grid = proxy(self)  # a cycle of references would keep the memory of a grid that is done
-        return DistributedRows(self.ranks, self.points_y, self._threads, lambda: grid._memory[1])
+
+        def spare() -> Field:
+            return grid._memory[1].view(grid.real)
+
+        return DistributedRows(self.ranks, self.points_y, self._threads, spare)
 
     @cached_property
     def spans(self) -> list[Span]:
@@ -80,14 +83,6 @@ class DistributedGrid(Grid):
         gathered = np.empty((sum(counts) // len(values), len(values)), values.dtype)
         self.ranks.wait(self.ranks.comm.Iallgatherv(own, [gathered, counts]))
         return gathered.T
-
-    @cached_property
-    def _memory(self) -> tuple[Any, Field]:
-        """Memory of the coefficients, and as much again, as real values, for the exchange."""
-        rows, columns = self.rows.count, self.points // 2 + 1
-        size = max(rows * columns, self.points_y * self.spectral_shape[1])
-        room = max(size, (rows + 2 * HALO_ROWS) * columns)
-        return pyfftw.empty_aligned(size, self._complex), pyfftw.empty_aligned(2 * room, self.real)
 
     def _transposition(self, columns: int) -> Transposition:
         return Transposition(self.ranks, self.rows.edges, columns)

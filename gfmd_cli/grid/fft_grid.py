@@ -18,7 +18,7 @@ from gfmd_cli.grid.convolution import PaddedTransform, padded_shape
 from gfmd_cli.grid.modes import multiplicity, shared_modes
 from gfmd_cli.grid.pixels import average_along_x, average_rows, covered_rows
 from gfmd_cli.grid.rows import LocalRows
-from gfmd_cli.grid.shared_transforms import Columns, FieldTransforms
+from gfmd_cli.grid.shared_transforms import Columns, FieldTransforms, transform_memory
 from gfmd_cli.grid.transposition import Span, Transposition
 
 T = TypeVar("T")
@@ -192,15 +192,15 @@ class Grid:
         return 2 if self.precision == "double" else 1
 
     @cached_property
-    def _memory(self) -> tuple[Any, ...]:
+    def _memory(self) -> list[Modes]:
         """Memory that transforms work in, of one axis."""
-        return (aligned(prod(self.spectral_shape), self._complex),)
+        columns = self.points // 2 + 1
+        return transform_memory(self.rows, columns, self._complex, self._transposition(columns))
 
     def in_single(self) -> "Grid":
         """The same grid in single precision; its transforms work in the memory of this one's."""
         grid = replace(self, precision="single")
-        kinds = {"f": grid.real, "c": grid._complex}
-        vars(grid)["_memory"] = tuple(part.view(kinds[part.dtype.kind]) for part in self._memory)
+        vars(grid)["_memory"] = [part.view(grid._complex) for part in self._memory]
         return grid
 
     def _transposition(self, columns: int) -> Transposition | None:

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 import pyfftw
 
-from gfmd_cli.grid.arrays import Field, Modes
+from gfmd_cli.grid.arrays import Field, Modes, aligned
 from gfmd_cli.grid.plans import Planner, planned_transforms
 from gfmd_cli.grid.rows import LocalRows
 from gfmd_cli.grid.transposition import Transposition
@@ -173,6 +173,20 @@ class ColumnTransforms:
         side_by_side(self.pool, [partial(share, numbers) for numbers in self.shares])
 
 
+def transform_memory(
+    rows: LocalRows, columns: int, kind: Any, transposition: Transposition | None
+) -> list[Modes]:
+    """Memory of the coefficients of so many columns; for a transposition, and as much again.
+
+    The latter is also enough for a real field with its halo.
+    """
+    if transposition is None:
+        return [aligned(rows.count * columns, kind)]
+    first, last = transposition.span
+    size = max(rows.count * columns, transposition.edges[-1] * (last - first))
+    return [aligned(size, kind), aligned((rows.count + 2 * rows.halo) * columns, kind)]
+
+
 class FieldTransforms:
     """Transforms of a field along both axes and back, in one memory, without a factor.
 
@@ -181,7 +195,7 @@ class FieldTransforms:
 
     Parameters
     ----------
-    memory : of the coefficients; for a transposition also spare memory for as many
+    memory : from `transform_memory`
     points : number of real values of a row
     rows : the rows of this process
     transposition : exchange between the processes that share the field; None for one process
@@ -190,7 +204,7 @@ class FieldTransforms:
 
     def __init__(
         self,
-        memory: Sequence[Any],
+        memory: Sequence[Modes],
         points: int,
         rows: LocalRows,
         transposition: Transposition | None,
@@ -210,7 +224,7 @@ class FieldTransforms:
         self.values: Field = self.lines.view(real)[:, :points]
         """The rows as real values."""
         self._transposition = transposition
-        self._arrays = self.lines, self.work, memory[-1].view(self.work.dtype)
+        self._arrays = self.lines, self.work, memory[-1]
 
         def make(fftw: Planner) -> tuple[RowTransforms, ColumnTransforms]:
             length = padded_rows or len(self.work)
