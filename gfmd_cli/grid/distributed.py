@@ -21,23 +21,16 @@ from gfmd_cli.grid.transposition import Span, Transposition
 
 
 def create_grid(grid: Grid, ranks: Ranks | None) -> Grid:
-    """The grid, distributed over the processes if it is large enough."""
-    if ranks is None or not _suits(grid.whole_shape, ranks):
+    """The grid, distributed if every process gets enough rows, and columns of coefficients."""
+    if ranks is None or grid.dimension == 1 or grid.points // 2 + 1 < ranks.size:
+        return grid
+    if not is_distributable(grid.points_y, ranks.size):
         return grid
     return DistributedGrid(**_fields(grid), ranks=ranks)
 
 
 def _fields(grid: Grid) -> dict[str, Any]:
     return {field.name: getattr(grid, field.name) for field in fields(Grid)}
-
-
-def _suits(shape: Shape, ranks: Ranks) -> bool:
-    """Whether every process gets enough rows of a grid, and columns of its coefficients."""
-    return (
-        len(shape) == 2
-        and is_distributable(shape[0], ranks.size)
-        and shape[1] // 2 + 1 >= ranks.size
-    )
 
 
 @dataclass(frozen=True, kw_only=True)

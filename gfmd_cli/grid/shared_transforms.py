@@ -112,8 +112,6 @@ class ColumnTransforms:
         self.is_copied = length > len(work) or is_large
 
         def plan(array: Modes) -> tuple[Execute, Execute]:
-            if length == 1:
-                return _nothing, _nothing
             directions = ("FFTW_FORWARD", "FFTW_BACKWARD")
             forward, backward = (fftw(array, array, (0,), way).execute for way in directions)
             return forward, backward
@@ -253,10 +251,6 @@ class FieldTransforms:
         self.to_columns(blocks)
         self.along_columns.filter(multiply)
         self.to_values()
-
-
-def _nothing() -> None:
-    """The transform of columns of one row."""
 
 
 def side_by_side(pool: ThreadPoolExecutor | None, calls: Sequence[Execute]) -> None:
