@@ -227,14 +227,15 @@ class Grid:
     def transform(self) -> None:
         """`work` <- coefficients of the values in `padded`, without the factor 1/size."""
         self._transforms.to_columns()
-        self._transforms.along_columns.forward()
+        self._transforms.along_columns.run(lambda columns: columns.forward())
 
     def transform_back(self, kept: int | None = None) -> None:
         """`padded` <- values of the coefficients in `work`, without the factor 1/size.
 
         Only the first `kept` columns of the whole grid, if given, are not zero.
         """
-        self._transforms.along_columns.backward(None if kept is None else kept - self.span[0])
+        own = None if kept is None else kept - self.span[0]
+        self._transforms.along_columns.run(lambda columns: columns.backward(), own)
         self._transforms.to_values()
 
     def _filter_by(

@@ -96,7 +96,7 @@ class Columns:
 
 
 class ColumnTransforms:
-    """Transforms of the columns of coefficients, and back, without a factor.
+    """Transforms of the columns of coefficients, and back, without a factor; see `run`.
 
     Parameters
     ----------
@@ -133,24 +133,6 @@ class ColumnTransforms:
             parts = [slice(int(a), int(b)) for a, b in pairwise(edges) if a < b]
             self.blocks = [Columns(p, work, p.start, *plan(work[:, p])) for p in parts]
         self.shares = [range(i, len(self.blocks), count) for i in range(count)]
-
-    def forward(self) -> None:
-        """Transform all columns."""
-        self.run(lambda columns: columns.forward())
-
-    def backward(self, kept: int | None = None) -> None:
-        """Transform all columns back; all but the first `kept`, if given, are zero."""
-        self.run(lambda columns: columns.backward(), kept)
-
-    def filter(self, multiply: Callable[[Columns], None]) -> None:
-        """Transform the columns, multiply them and transform them back."""
-
-        def step(columns: Columns) -> None:
-            columns.forward()
-            multiply(columns)
-            columns.backward()
-
-        self.run(step)
 
     def run(self, step: Callable[[Columns], None], kept: int | None = None) -> None:
         """Call `step` for all columns, or for blocks that contain one of the first `kept`."""
@@ -248,8 +230,14 @@ class FieldTransforms:
         self, multiply: Callable[[Columns], None], blocks: Sequence[int] | None = None
     ) -> None:
         """Transform `values`, multiply the coefficients and transform them back."""
+
+        def step(columns: Columns) -> None:
+            columns.forward()
+            multiply(columns)
+            columns.backward()
+
         self.to_columns(blocks)
-        self.along_columns.filter(multiply)
+        self.along_columns.run(step)
         self.to_values()
 
 
