@@ -44,11 +44,7 @@ class DistributedGrid(Grid):
     def rows(self) -> DistributedRows:
         """The rows of this process."""
         grid = proxy(self)  # a cycle of references would keep the memory of a grid that is done
-
-        def spare() -> Field:
-            return grid._memory[1].view(grid.real)
-
-        return DistributedRows(self.ranks, self.points_y, self._threads, spare)
+        return DistributedRows(self.ranks, self.points_y, self._threads, lambda: grid._memory[1])
 
     @cached_property
     def spans(self) -> list[Span]:

@@ -58,9 +58,8 @@ class RowTransforms:
         calls, count = self._forward, len(self._of_block)
         if blocks is not None and count:
             self.lines.view(self.values.dtype)[:, self.values.shape[1] :] = 0.0
-            shares = [blocks[i::count] for i in range(count)]
-            pairs = zip(self._of_block, shares, strict=True)
-            calls = [partial(self._transform, plan, share) for plan, share in pairs]
+            shares = ((plan, blocks[i::count]) for i, plan in enumerate(self._of_block))
+            calls = [partial(self._transform, *share) for share in shares]
         side_by_side(self.pool, calls)
 
     def backward(self) -> None:
