@@ -64,8 +64,3 @@ def test_the_map_can_be_applied_in_place():
     expected = 3 * field
     assert transform.apply(transform.symbol_of(kernel), field, field) is field
     assert field == pytest.approx(expected, rel=0, abs=1e-13)
-
-
-def test_a_convolution_on_too_few_points_is_an_error():
-    with pytest.raises(ValueError, match="twice the points"):
-        PaddedTransform((8, 8), (14, 16)).symbol_of(np.ones((8, 8)))

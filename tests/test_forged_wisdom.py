@@ -32,7 +32,7 @@ def keep(folder, wisdom, text=None):
     """Keep wisdom in a folder, with a valid checksum; `text` replaces that in double precision."""
     ((key, (double, single)),) = wisdom.items()
     plans._write(folder, {key: [text or double, single]})
-    plans._forget()
+    plans._known.clear()
 
 
 def text_of(wisdom):

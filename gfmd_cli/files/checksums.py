@@ -22,9 +22,7 @@ MIN_BLOCK = 4096  # bytes that a file takes at least; small ones may be stored i
 def seal(file: NewFile) -> None:
     """End a new file with the checksum of its content."""
     file.seek(0)
-    mark = _mark(crc32(file, os.fstat(file.fileno()).st_size))
-    file.seek(0, os.SEEK_END)
-    file.write(mark)
+    file.write(_mark(crc32(file, os.fstat(file.fileno()).st_size)))
 
 
 def sealed(content: bytes) -> bytes:

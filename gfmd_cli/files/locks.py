@@ -90,17 +90,15 @@ def locked(
             except OSError as error:
                 if error.errno not in NO_LOCKS:
                     raise SpaceError(f"{path}: cannot be locked: {error.strerror}") from error
-            else:
-                if _is_at(file.fileno(), path):
-                    try:
-                        yield True
-                    finally:
-                        fcntl.flock(file, fcntl.LOCK_UN)  # a process forked meanwhile holds it, too
-                    return
-                continue
-        with _owned(path.with_name(f"{path.name}.owner"), shared, wait, waits) as acquired:
-            yield acquired
-        return
+                break
+            if _is_at(file.fileno(), path):
+                try:
+                    yield True
+                finally:
+                    fcntl.flock(file, fcntl.LOCK_UN)  # a process forked meanwhile holds it, too
+                return
+    with _owned(path.with_name(f"{path.name}.owner"), shared, wait, waits) as acquired:
+        yield acquired
 
 
 class _Wait:

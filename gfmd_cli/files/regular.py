@@ -8,9 +8,7 @@ import errno
 import os
 import stat
 from pathlib import Path
-from typing import BinaryIO, cast
-
-MODES = {os.O_RDONLY: "rb", os.O_WRONLY: "wb", os.O_RDWR: "r+b"}
+from typing import BinaryIO
 
 
 def open_regular(path: Path, flags: int = os.O_RDONLY, *, follow: bool = False) -> BinaryIO:
@@ -18,22 +16,23 @@ def open_regular(path: Path, flags: int = os.O_RDONLY, *, follow: bool = False) 
 
     Parameters
     ----------
-    flags : as of `os.open`; truncate the file afterwards, not by a flag
+    flags : as of `os.open`, to read or to read and write; truncate the file afterwards, not by a
+        flag
     follow : whether the path may be a symbolic link, as those that users give
 
     Raises OSError for a link, a directory, a FIFO, a device or a socket, and for a file of several
     names (hard links) that is to be written.
     """
     guards = os.O_NONBLOCK | os.O_CLOEXEC | (0 if follow else os.O_NOFOLLOW)
-    access = flags & (os.O_RDONLY | os.O_WRONLY | os.O_RDWR)
+    is_writable = bool(flags & os.O_RDWR)
     descriptor = os.open(path, flags | guards, 0o666)
     try:
         status = os.fstat(descriptor)
         if not stat.S_ISREG(status.st_mode):
             raise OSError(errno.EINVAL, "not a regular file", str(path))
-        if access != os.O_RDONLY and status.st_nlink > 1 and not follow:
+        if is_writable and status.st_nlink > 1 and not follow:
             raise OSError(errno.EMLINK, "a file of several names (hard links)", str(path))
-        return cast(BinaryIO, os.fdopen(descriptor, MODES[access]))
+        return os.fdopen(descriptor, "r+b" if is_writable else "rb")
     except BaseException:
         os.close(descriptor)
         raise

@@ -70,10 +70,7 @@ def _stamp(function: Callable[..., Any]) -> str:
         for name, value in function.__globals__.items()
         if isinstance(value, int | float | np.generic)
     }
-    options = {
-        name: sorted(value) if isinstance(value, set) else value
-        for name, value in NUMBA_OPTIONS.items()
-    }
+    options = NUMBA_OPTIONS | {"fastmath": sorted(NUMBA_OPTIONS["fastmath"])}
     return digest([_text(function.__code__.co_filename), numbers, options])
 
 

@@ -10,12 +10,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import pyfftw
 
 from gfmd_cli.grid import plans
 from gfmd_cli.grid.arrays import Field, Precision
 from gfmd_cli.grid.rows import LocalRows
-from gfmd_cli.grid.shared_transforms import Columns, FieldTransforms
+from gfmd_cli.grid.shared_transforms import Columns, FieldTransforms, transform_memory
 from gfmd_cli.grid.transposition import Transposition
 
 
@@ -46,7 +45,7 @@ class PaddedTransform:
     def __post_init__(self) -> None:
         self.field_rows, self.field_columns = (1, *self.shape)[-2:]
         self.padded_rows, self.padded_columns = (1, *self.padded)[-2:]
-        self.real = np.dtype(np.float64 if self.precision == "double" else np.float32)
+        self.real = np.dtype(self.precision)
         self.own_rows, self.span = self.field_rows, (0, self.padded_columns // 2 + 1)
         if self.transposition is not None:
             self.own_rows, self.span = self.transposition.row_count, self.transposition.span
@@ -68,13 +67,8 @@ class PaddedTransform:
     def symbol_of(self, kernel: Field) -> Field:
         """The symbol of a convolution with a kernel G(|y|, |x|), given at the points of a field.
 
-        Raises ValueError where the padding is less than twofold.
+        The padding must be twofold.
         """
-        if (
-            self.padded_rows < 2 * self.field_rows - 1
-            or self.padded_columns < 2 * self.field_columns - 1
-        ):
-            raise ValueError("a convolution needs twice the points")
         kernel = kernel.reshape(self.own_rows, self.field_columns)
         transforms, symbol = self._transforms, np.empty(self.symbol_shape, self.real)
         values, work = transforms.values, transforms.work
@@ -113,16 +107,7 @@ class PaddedTransform:
     @cached_property
     def _transforms(self) -> FieldTransforms:
         """The transforms of the padded fields, and their memory."""
-        modes, (first, last) = self.padded_columns // 2 + 1, self.span
-        sizes = self.own_rows * modes, self.field_rows * (last - first)  # as rows, as columns
+        rows, exchange, columns = self.local_rows, self.transposition, self.padded_columns
         kind = np.result_type(self.real, np.complex64)
-        memory = [pyfftw.empty_aligned(max(sizes), kind)]
-        if self.transposition is not None:
-            memory.append(pyfftw.empty_aligned(sizes[0], kind))
-        return FieldTransforms(
-            memory,
-            self.padded_columns,
-            self.local_rows,
-            self.transposition,
-            padded_rows=self.padded_rows,
-        )
+        memory = transform_memory(rows, columns // 2 + 1, kind, exchange)
+        return FieldTransforms(memory, columns, rows, exchange, padded_rows=self.padded_rows)

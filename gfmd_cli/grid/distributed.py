@@ -12,33 +12,25 @@ from typing import Any
 from weakref import proxy
 
 import numpy as np
-import pyfftw
 
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.grid.fft_grid import Grid, Shape
-from gfmd_cli.grid.halo import HALO_ROWS, DistributedRows, is_distributable
+from gfmd_cli.grid.halo import DistributedRows, is_distributable
 from gfmd_cli.grid.ranks import Ranks, is_root
 from gfmd_cli.grid.transposition import Span, Transposition
 
 
 def create_grid(grid: Grid, ranks: Ranks | None) -> Grid:
-    """The grid, distributed over the processes if it is large enough."""
-    if ranks is None or not _suits(grid.whole_shape, ranks):
+    """The grid, distributed if every process gets enough rows, and columns of coefficients."""
+    if ranks is None or grid.dimension == 1 or grid.points // 2 + 1 < ranks.size:
+        return grid
+    if not is_distributable(grid.points_y, ranks.size):
         return grid
     return DistributedGrid(**_fields(grid), ranks=ranks)
 
 
 def _fields(grid: Grid) -> dict[str, Any]:
     return {field.name: getattr(grid, field.name) for field in fields(Grid)}
-
-
-def _suits(shape: Shape, ranks: Ranks) -> bool:
-    """Whether every process gets enough rows of a grid, and columns of its coefficients."""
-    return (
-        len(shape) == 2
-        and is_distributable(shape[0], ranks.size)
-        and shape[1] // 2 + 1 >= ranks.size
-    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -80,14 +72,6 @@ class DistributedGrid(Grid):
         gathered = np.empty((sum(counts) // len(values), len(values)), values.dtype)
         self.ranks.wait(self.ranks.comm.Iallgatherv(own, [gathered, counts]))
         return gathered.T
-
-    @cached_property
-    def _memory(self) -> tuple[Any, Field]:
-        """Memory of the coefficients, and as much again, as real values, for the exchange."""
-        rows, columns = self.rows.count, self.points // 2 + 1
-        size = max(rows * columns, self.points_y * self.spectral_shape[1])
-        room = max(size, (rows + 2 * HALO_ROWS) * columns)
-        return pyfftw.empty_aligned(size, self._complex), pyfftw.empty_aligned(2 * room, self.real)
 
     def _transposition(self, columns: int) -> Transposition:
         return Transposition(self.ranks, self.rows.edges, columns)

@@ -18,7 +18,7 @@ from gfmd_cli.grid.convolution import PaddedTransform, padded_shape
 from gfmd_cli.grid.modes import multiplicity, shared_modes
 from gfmd_cli.grid.pixels import average_along_x, average_rows, covered_rows
 from gfmd_cli.grid.rows import LocalRows
-from gfmd_cli.grid.shared_transforms import Columns, FieldTransforms
+from gfmd_cli.grid.shared_transforms import Columns, FieldTransforms, transform_memory
 from gfmd_cli.grid.transposition import Span, Transposition
 
 T = TypeVar("T")
@@ -54,12 +54,12 @@ class Grid:
     @property
     def real(self) -> "np.dtype[np.floating[Any]]":
         """Type of the values of a field."""
-        return np.dtype(np.float64 if self.precision == "double" else np.float32)
+        return np.dtype(self.precision)
 
     @property
     def _complex(self) -> "np.dtype[np.complexfloating[Any, Any]]":
         """Type of Fourier coefficients."""
-        return np.dtype(np.complex128 if self.precision == "double" else np.complex64)
+        return np.result_type(self.real, np.complex64)
 
     @property
     def whole_shape(self) -> Shape:
@@ -192,15 +192,15 @@ class Grid:
         return 2 if self.precision == "double" else 1
 
     @cached_property
-    def _memory(self) -> tuple[Any, ...]:
+    def _memory(self) -> list[Modes]:
         """Memory that transforms work in, of one axis."""
-        return (aligned(prod(self.spectral_shape), self._complex),)
+        columns = self.points // 2 + 1
+        return transform_memory(self.rows, columns, self._complex, self._transposition(columns))
 
     def in_single(self) -> "Grid":
         """The same grid in single precision; its transforms work in the memory of this one's."""
         grid = replace(self, precision="single")
-        kinds = {"f": grid.real, "c": grid._complex}
-        vars(grid)["_memory"] = tuple(part.view(kinds[part.dtype.kind]) for part in self._memory)
+        vars(grid)["_memory"] = [part.view(grid._complex) for part in self._memory]
         return grid
 
     def _transposition(self, columns: int) -> Transposition | None:
@@ -227,14 +227,15 @@ class Grid:
     def transform(self) -> None:
         """`work` <- coefficients of the values in `padded`, without the factor 1/size."""
         self._transforms.to_columns()
-        self._transforms.along_columns.forward()
+        self._transforms.along_columns.run(lambda columns: columns.forward())
 
     def transform_back(self, kept: int | None = None) -> None:
         """`padded` <- values of the coefficients in `work`, without the factor 1/size.
 
         Only the first `kept` columns of the whole grid, if given, are not zero.
         """
-        self._transforms.along_columns.backward(None if kept is None else kept - self.span[0])
+        own = None if kept is None else kept - self.span[0]
+        self._transforms.along_columns.run(lambda columns: columns.backward(), own)
         self._transforms.to_values()
 
     def _filter_by(

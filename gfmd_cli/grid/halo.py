@@ -12,7 +12,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from gfmd_cli.grid.arrays import Field
+from gfmd_cli.grid.arrays import Field, Modes
 from gfmd_cli.grid.ranks import Ranks
 from gfmd_cli.grid.rows import Kernel, LocalRows
 
@@ -45,7 +45,7 @@ class DistributedRows(LocalRows):
     is_whole: ClassVar[bool] = False
 
     def __init__(
-        self, ranks: Ranks, points: int, threads: int, spare: Callable[[], Field] | None = None
+        self, ranks: Ranks, points: int, threads: int, spare: Callable[[], Modes] | None = None
     ) -> None:
         self.ranks, self.points, self.spare = ranks, points, spare
         self.edges = block_edges(points, ranks.size)
@@ -60,7 +60,7 @@ class DistributedRows(LocalRows):
         """A field with its halo, in the spare memory of the grid."""
         assert self.spare is not None
         shape = (self.count + 2 * HALO_ROWS, field.shape[1])
-        array = self.spare()[: shape[0] * shape[1]].reshape(shape)
+        array = self.spare().view(field.dtype)[: shape[0] * shape[1]].reshape(shape)
         self.interior(array)[...] = field
         self.exchange_halo(array)
         return array

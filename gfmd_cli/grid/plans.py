@@ -96,9 +96,8 @@ class _Planning(NamedTuple):
 _CACHED = _Planning()
 _planning: ContextVar[_Planning] = ContextVar("planning", default=_CACHED)
 """Planning of the present thread: a process may run several studies side by side."""
-_known: Wisdom = {}
-"""What this process has read or measured for one run."""
-_known_to = _CACHED  # this run; the wisdom of another one may differ
+_known: dict[_Planning, Wisdom] = {}
+"""What this process has read or measured for each run; the wisdom of another one may differ."""
 _estimates: Wisdom = {}
 """What this process has estimated, which is the same for all runs."""
 
@@ -112,7 +111,7 @@ def plan_with(
     """
     _planning.set(_Planning(folder, estimated, waits))
     with _planner:
-        _forget()
+        _known.clear()
         _without_lock.clear()
         if folder is None or are_estimated():
             return None
@@ -124,13 +123,6 @@ def plan_with(
     if not damaged:
         return None
     return f"{_path(folder)}: damaged; transforms are planned anew, last bits may differ"
-
-
-def _forget() -> None:
-    """Forget all wisdom, from now on for the run of this thread."""
-    global _known_to
-    _known.clear()
-    _known_to = _planning.get()
 
 
 def are_estimated() -> bool:
@@ -153,9 +145,8 @@ def planned_transforms(make: Callable[[Planner], T], size: int = 0) -> T:
     """
     fftw = partial(pyfftw.FFTW, planning_timelimit=PLANNING_SECONDS[0] + PLANNING_SECONDS[1] * size)
     with _planner:
-        if _known_to != _planning.get():  # a run in another thread has planned since
-            _forget()
-        key, known = _key(make), _estimates if are_estimated() else _known
+        key = _key(make)
+        known = _estimates if are_estimated() else _known.setdefault(_planning.get(), {})
         with suppress(KeyError, RuntimeError):  # not known
             return _by_wisdom(known[key], make, fftw)
         return (_searched if are_estimated() else _measured)(known, key, make, fftw)
@@ -212,21 +203,21 @@ def _measured(known: Wisdom, key: str, make: Callable[[Planner], T], fftw: Plann
             return _by_wisdom(stored[key], make, fftw)
         transforms = _searched(known, key, make, fftw)
         if of_study is None:
-            _add_to_cache(key, alone)
+            _add_to_cache(key, known[key], alone)
         else:
             _write(folder, stored | {key: known[key]})
     if of_study is not None:
         with _planning_lock(cache_folder()) as alone:
-            _add_to_cache(key, alone)
+            _add_to_cache(key, known[key], alone)
     return transforms
 
 
-def _add_to_cache(key: str, alone: bool) -> None:
+def _add_to_cache(key: str, texts: list[str], alone: bool) -> None:
     """Store what this process has measured in the cache; `alone` says whether this is locked."""
     if alone:
         remove_temporary(_path(cache_folder()))
     cached = read_wisdom(cache_folder()) or {}
-    _write(cache_folder(), _limited(cached | {key: cached.get(key, _known[key])}))
+    _write(cache_folder(), _limited(cached | {key: cached.get(key, texts)}))
 
 
 def read_wisdom(folder: Path) -> Wisdom | None:

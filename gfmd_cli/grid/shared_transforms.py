@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 import pyfftw
 
-from gfmd_cli.grid.arrays import Field, Modes
+from gfmd_cli.grid.arrays import Field, Modes, aligned
 from gfmd_cli.grid.plans import Planner, planned_transforms
 from gfmd_cli.grid.rows import LocalRows
 from gfmd_cli.grid.transposition import Transposition
@@ -58,9 +58,8 @@ class RowTransforms:
         calls, count = self._forward, len(self._of_block)
         if blocks is not None and count:
             self.lines.view(self.values.dtype)[:, self.values.shape[1] :] = 0.0
-            shares = [blocks[i::count] for i in range(count)]
-            pairs = zip(self._of_block, shares, strict=True)
-            calls = [partial(self._transform, plan, share) for plan, share in pairs]
+            shares = ((plan, blocks[i::count]) for i, plan in enumerate(self._of_block))
+            calls = [partial(self._transform, *share) for share in shares]
         side_by_side(self.pool, calls)
 
     def backward(self) -> None:
@@ -96,7 +95,7 @@ class Columns:
 
 
 class ColumnTransforms:
-    """Transforms of the columns of coefficients, and back, without a factor.
+    """Transforms of the columns of coefficients, and back, without a factor; see `run`.
 
     Parameters
     ----------
@@ -112,8 +111,6 @@ class ColumnTransforms:
         self.is_copied = length > len(work) or is_large
 
         def plan(array: Modes) -> tuple[Execute, Execute]:
-            if length == 1:
-                return _nothing, _nothing
             directions = ("FFTW_FORWARD", "FFTW_BACKWARD")
             forward, backward = (fftw(array, array, (0,), way).execute for way in directions)
             return forward, backward
@@ -136,24 +133,6 @@ class ColumnTransforms:
             self.blocks = [Columns(p, work, p.start, *plan(work[:, p])) for p in parts]
         self.shares = [range(i, len(self.blocks), count) for i in range(count)]
 
-    def forward(self) -> None:
-        """Transform all columns."""
-        self.run(lambda columns: columns.forward())
-
-    def backward(self, kept: int | None = None) -> None:
-        """Transform all columns back; all but the first `kept`, if given, are zero."""
-        self.run(lambda columns: columns.backward(), kept)
-
-    def filter(self, multiply: Callable[[Columns], None]) -> None:
-        """Transform the columns, multiply them and transform them back."""
-
-        def step(columns: Columns) -> None:
-            columns.forward()
-            multiply(columns)
-            columns.backward()
-
-        self.run(step)
-
     def run(self, step: Callable[[Columns], None], kept: int | None = None) -> None:
         """Call `step` for all columns, or for blocks that contain one of the first `kept`."""
         rows, end = len(self.work), self.work.shape[1] if kept is None else kept
@@ -173,6 +152,20 @@ class ColumnTransforms:
         side_by_side(self.pool, [partial(share, numbers) for numbers in self.shares])
 
 
+def transform_memory(
+    rows: LocalRows, columns: int, kind: Any, transposition: Transposition | None
+) -> list[Modes]:
+    """Memory of the coefficients of so many columns; for a transposition, and as much again.
+
+    The latter is also enough for a real field with its halo.
+    """
+    if transposition is None:
+        return [aligned(rows.count * columns, kind)]
+    first, last = transposition.span
+    size = max(rows.count * columns, transposition.edges[-1] * (last - first))
+    return [aligned(size, kind), aligned((rows.count + 2 * rows.halo) * columns, kind)]
+
+
 class FieldTransforms:
     """Transforms of a field along both axes and back, in one memory, without a factor.
 
@@ -181,7 +174,7 @@ class FieldTransforms:
 
     Parameters
     ----------
-    memory : of the coefficients; for a transposition also spare memory for as many
+    memory : from `transform_memory`
     points : number of real values of a row
     rows : the rows of this process
     transposition : exchange between the processes that share the field; None for one process
@@ -190,7 +183,7 @@ class FieldTransforms:
 
     def __init__(
         self,
-        memory: Sequence[Any],
+        memory: Sequence[Modes],
         points: int,
         rows: LocalRows,
         transposition: Transposition | None,
@@ -210,7 +203,7 @@ class FieldTransforms:
         self.values: Field = self.lines.view(real)[:, :points]
         """The rows as real values."""
         self._transposition = transposition
-        self._arrays = self.lines, self.work, memory[-1].view(self.work.dtype)
+        self._arrays = self.lines, self.work, memory[-1]
 
         def make(fftw: Planner) -> tuple[RowTransforms, ColumnTransforms]:
             length = padded_rows or len(self.work)
@@ -236,13 +229,15 @@ class FieldTransforms:
         self, multiply: Callable[[Columns], None], blocks: Sequence[int] | None = None
     ) -> None:
         """Transform `values`, multiply the coefficients and transform them back."""
+
+        def step(columns: Columns) -> None:
+            columns.forward()
+            multiply(columns)
+            columns.backward()
+
         self.to_columns(blocks)
-        self.along_columns.filter(multiply)
+        self.along_columns.run(step)
         self.to_values()
-
-
-def _nothing() -> None:
-    """The transform of columns of one row."""
 
 
 def side_by_side(pool: ThreadPoolExecutor | None, calls: Sequence[Execute]) -> None:

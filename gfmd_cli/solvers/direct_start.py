@@ -138,8 +138,7 @@ class _DirectSolve:
                 t, factor = self.equilibrium(points)  # [1]
             except scipy.linalg.LinAlgError:  # rounding, at very steep k(q)
                 return False
-            has_tension = self.stress is not None and np.any(t < 0)
-            if has_tension:
+            if self.stress is not None and np.any(t < 0):
                 self.approach(points, t, factor)  # [2]
                 del factor  # before the next one, which is as large as some fields
                 continue

@@ -157,15 +157,15 @@ class Dual(Solver):
         best = fall / curvature if curvature > 0 else 1.0
         length = best * state.length
         exact = not clipped and (best <= 1 or not grid.any(stress + length * state.direction < 0))
-        choice = choose(best, exact)
-        state.length *= choice.factor
-        if choice.restart:
+        fraction, factor, restart = choose(best, exact)
+        state.length *= factor
+        if restart:
             state.slope = 0.0
-        if choice.fraction == 1.0:  # [5]
+        if fraction == 1.0:  # [5]
             stress[...] = target
         else:
-            np.maximum(stress + choice.fraction * move, 0.0, out=stress)
-        change *= choice.fraction
+            np.maximum(stress + fraction * move, 0.0, out=stress)
+        change *= fraction
         state.gap += change
         return True
 

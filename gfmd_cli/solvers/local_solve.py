@@ -84,6 +84,7 @@ class LocalSolve:
         self.contact, self.grid, self.pause = contact, contact.grid, pause
         self.operators = self.operators_type(contact)
         self.transforms = 0.0
+        self.total = contact.pressure * contact.grid.size  # sum of the pressure over the grid
         self.place(tiles, s)
 
     def place(self, tiles: Tiles, s: Field) -> None:
@@ -93,11 +94,6 @@ class LocalSolve:
         self.correction: Field | float = 0.0
         self.map_pressure = self.operators.displacement(tiles)
         self.map_displacement = self.operators.stress(tiles)
-
-    @property
-    def total(self) -> float:
-        """Sum of the pressure over the grid."""
-        return self.contact.pressure * self.grid.size
 
     def compliance(self, s: Field) -> Field:
         """C s on the tiles."""
@@ -175,14 +171,13 @@ class LocalSolve:
         entered = np.zeros(self.tiles.used.shape, dtype=np.bool_)
         fields = (displacement, level, self.contact.obstacle, self.tiles.used, entered)
         squares = float(self.grid.rows.sums(1, kernels.mark_entered, *fields)[0])
-        if not entered.any():
-            return squares
-        is_periodic = self.tiles.is_periodic
-        around = maximum_filter(entered, 3, mode="wrap" if is_periodic else "constant")
-        tiles = Tiles(self.tiles.used | around, is_periodic=is_periodic)
-        s = np.zeros((tiles.count, SIDE * SIDE))
-        s[self.tiles.used[tiles.used]] = self.s
-        self.place(tiles, s)
+        if entered.any():
+            is_periodic = self.tiles.is_periodic
+            around = maximum_filter(entered, 3, mode="wrap" if is_periodic else "constant")
+            tiles = Tiles(self.tiles.used | around, is_periodic=is_periodic)
+            s = np.zeros((tiles.count, SIDE * SIDE))
+            s[self.tiles.used[tiles.used]] = self.s
+            self.place(tiles, s)
         return squares
 
     def run(self, tolerance: float) -> None:
@@ -211,10 +206,10 @@ class LocalSolve:
             curvature = dot(move, change)
             best = -dot(move, gap) / curvature if curvature > 0 else 1.0
             exact = not is_clipped and (best <= 1 or float((s + best * move).min()) >= 0)
-            choice = choose(best, exact)
-            length *= choice.factor
-            if choice.restart:
+            fraction, factor, restart = choose(best, exact)
+            length *= factor
+            if restart:
                 slope = 0.0
-            s = np.maximum(s + choice.fraction * move, 0.0)
-            w += choice.fraction * change
+            s = np.maximum(s + fraction * move, 0.0)
+            w += fraction * change
         self.s = s

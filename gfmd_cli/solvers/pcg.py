@@ -38,7 +38,7 @@ from gfmd_cli.solvers.contact_state import PRESSED, TENSE, refined
 from gfmd_cli.solvers.loop import Solver, Start, State
 from gfmd_cli.solvers.multigrid import largest_growth
 from gfmd_cli.solvers.preconditioners import Preconditioner, create, select
-from gfmd_cli.solvers.projected_move import MAX_HALVINGS, MoveChoice, choose, conjugation
+from gfmd_cli.solvers.projected_move import MAX_HALVINGS, choose, conjugation
 
 MAX_TENSION_RATIO = 0.3  # of rms tension to rms free force
 """With 0.1 the transforms are 0.96 to 1.06 times as many, with 1: 1.03 to 1.16 times (n = 1 to 4,
@@ -189,9 +189,8 @@ class _Run:
 
     def assess(self, sums: Field) -> None:
         """Store the residual and the sums of squares of the free force and of the tension."""
-        violation, free, tension = map(float, sums)
+        violation, self.state.free, self.state.tension = sums.tolist()
         self.state.residual = self.contact.as_residual(violation)
-        self.state.free, self.state.tension = free, tension
 
     def select(self) -> None:
         """Choose the points that are held and, at some steps, the preconditioner.
@@ -242,30 +241,29 @@ class _Run:
     def advance(self, beta: float) -> None:
         """Compute the new direction, and move along it such that the energy does not rise."""
         state, fields = self.state, (self.h, self.u, self.sigma)
-        descent, fall, square, stopped = self.update_direction(beta)  # [3]
+        descent, fall, square, stopped = self.update_direction(beta)  # [3], [4]
         if descent <= 0:
             self.precondition()  # z was overwritten by the projected move
             descent, fall, square, stopped = self.update_direction(0.0)
-        fraction, is_moved = 0.0, state.length > 0
-        if not is_moved:
+        fraction = 0.0
+        if state.length <= 0:
             state.length = self.exact_length(descent)
+            _, fall, square, stopped = self.update_direction(0.0, is_kept=True)
         for _ in range(MAX_HALVINGS):
             length = state.length
-            if not is_moved:  # [4]
-                _, fall, square, stopped = self.update_direction(0.0, is_kept=True)
             curvature = self.apply_stiffness()
             is_finite = isfinite(curvature)  # else the move overflows in single precision
             if fall > 0 and is_finite:
                 best = float(fall) / curvature if curvature > 0 else 1.0  # 1: a rigid shift
-                choice = self.choose_move(best, stopped > 0)
-                fraction, state.length = choice.fraction, length * choice.factor
-                restart = choice.restart or curvature <= 0
-                state.moved = 0.0 if restart else fraction * length
+                exact = not stopped and (best <= 1 or not self.crosses(best * length))
+                fraction, factor, restart = choose(best, exact)
+                state.length = factor * length
+                state.moved = 0.0 if restart or curvature <= 0 else fraction * length
                 state.best_length, state.curvature = best * length, curvature / length / length
                 break
             state.length = 0.5 * length if is_finite else min(0.5 * length, self.longest())
             state.moved = 0.0
-            is_moved = False
+            _, fall, square, stopped = self.update_direction(0.0, is_kept=True)  # [4]
         way = (self.direction, length, fraction, self.padded, self.change)
         self.assess(self.rows.sums(3, kernels.advance, *fields, *way, self.own_state))  # [5]
         state.exact = False
@@ -277,11 +275,6 @@ class _Run:
         fields = (self.h, self.u, self.sigma, self.own_state, self.threshold)
         direction = (beta, self.direction, is_kept, self.state.length)
         return self.rows.sums(4, kernels.update_direction, *fields, *direction, self.padded)
-
-    def choose_move(self, best: float, stopped: bool) -> MoveChoice:
-        """How much of a move to take if the energy is lowest at the fraction `best`."""
-        exact = not stopped and (best <= 1 or not self.crosses(best * self.state.length))
-        return choose(best, exact)
 
     def crosses(self, length: float) -> bool:
         """Whether the indenter would stop a move of this length at some point."""

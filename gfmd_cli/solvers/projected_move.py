@@ -5,8 +5,6 @@ along the straight line to the projected point, lowest at the fraction `best` of
 the line are feasible.
 """
 
-from typing import NamedTuple
-
 import numpy as np
 
 from gfmd_cli.grid.arrays import Field
@@ -22,25 +20,19 @@ LENGTH_CHANGE = (0.5, 2.0)  # range of the factor by which a projected move chan
 `scripts/solver_constants.py projected_move.LENGTH_CHANGE "(0.25, 4)" "(0.67, 1.5)"`."""
 
 
-class MoveChoice(NamedTuple):
-    """What to do with a move."""
+def choose(best: float, is_unclipped: bool) -> tuple[float, float, bool]:
+    """What to do with a move whose best fraction is `best`.
 
-    fraction: float
-    """Fraction of the move to take."""
-    factor: float
-    """Length of the next move over that of this one."""
-    restart: bool
-    """Whether the next direction is not conjugate to this one."""
-
-
-def choose(best: float, is_unclipped: bool) -> MoveChoice:
-    """The choice for a move; `is_unclipped`: no point is stopped before `best`."""
+    `is_unclipped` says whether no point is stopped before `best`. Returns the fraction of the move
+    to take, the length of the next move over that of this one, and whether the next direction is
+    not conjugate to this one.
+    """
     if is_unclipped:
-        return MoveChoice(best, best, False)  # the exact step of conjugate gradients
+        return best, best, False  # the exact step of conjugate gradients
     low, high = LENGTH_CHANGE
     is_full = best >= MIN_FULL_MOVE
     fraction = 1.0 if is_full else max(best, 0.0)
-    return MoveChoice(fraction, min(max(best, low), high), not is_full)
+    return fraction, min(max(best, low), high), not is_full
 
 
 def feasible(grid: Grid, direction: Field, stress: Field) -> Field:
