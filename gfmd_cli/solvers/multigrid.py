@@ -281,7 +281,7 @@ class Multigrid:
     def apply(
         self, sigma: Field, contact_state: ContactState, threshold: int, change: Field
     ) -> tuple[float, float]:
-        """See `preconditioners.GreensFunction.apply`."""
+        """See `preconditioners.Preconditioner.apply`."""
         first = self.coarse[0]
         self.rows.exchange_halo(contact_state)
         first.set_penalty(contact_state, threshold, 0)

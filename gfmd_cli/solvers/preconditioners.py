@@ -7,7 +7,7 @@
 - The V-cycle of `multigrid` takes the contact points into account and needs no transform.
 """
 
-from typing import TypeAlias
+from typing import Protocol
 
 import numpy as np
 
@@ -25,16 +25,13 @@ Measured. On lines a transform is cheap: at n = 3 both take as long at 8192 poin
 Green's function takes up to 1200 steps at 2048 points, and thousands beyond."""
 
 
-class GreensFunction:
-    """The screened Green's function, in the precision of the grid that `z` belongs to."""
+class Preconditioner(Protocol):
+    """A symmetric positive approximation of the inverse of K on the free points."""
 
-    def __init__(self, contact: Contact, screening: float, grid: Grid) -> None:
-        self.grid, self.rows = grid, contact.grid.rows
-        self.stiffness, self.screening = contact.stiffness, screening
-        self.z: Field = grid.as_rows(grid.padded)
-        """The preconditioned force, which `apply` writes; rows as of `Grid.padded`."""
-        self.transforms = grid.pair_cost
-        """Transforms in double precision that take as long as those of one application."""
+    z: Field
+    """The preconditioned force, which `apply` writes; rows as of `Grid.padded`."""
+    transforms: int
+    """Transforms in double precision that take as long as those of one application."""
 
     def apply(
         self, sigma: Field, contact_state: ContactState, threshold: int, change: Field
@@ -44,16 +41,27 @@ class GreensFunction:
         `contact_state` has a halo, which is filled here. Returns the sums of z times force and of
         z times `change`.
         """
+
+
+class GreensFunction:
+    """The screened Green's function, in the precision of the grid that `z` belongs to."""
+
+    def __init__(self, contact: Contact, screening: float, grid: Grid) -> None:
+        self.grid, self.rows = grid, contact.grid.rows
+        self.stiffness, self.screening = contact.stiffness, screening
+        self.z = grid.as_rows(grid.padded)
+        self.transforms = grid.pair_cost
+
+    def apply(
+        self, sigma: Field, contact_state: ContactState, threshold: int, change: Field
+    ) -> tuple[float, float]:
+        """See `Preconditioner.apply`."""
         grid, rows = self.grid, self.rows
         fields = (sigma, rows.interior(contact_state), threshold)
         rows.run(kernels.free_force, *fields, self.z)
         grid.unfilter_padded(self.stiffness, shift=self.screening)
         slope, z_change = rows.sums(2, kernels.slopes, *fields, change, self.z)
         return float(slope), float(z_change)
-
-
-Preconditioner: TypeAlias = GreensFunction | Multigrid
-"""A symmetric positive approximation of the inverse of K on the free points."""
 
 
 def select(contact: Contact, contact_state: ContactState, threshold: int) -> float:
