@@ -30,6 +30,7 @@ from gfmd_cli.study.provenance import origin
 from gfmd_cli.study.reading import StudyFile, damage_named, open_study
 from gfmd_cli.study.result import Entry, Outcome, TaskResult
 from gfmd_cli.study.tasks import Task
+from gfmd_cli.study.unfinished_work import set_aside
 from gfmd_cli.study.writing import write_study
 
 EARLIER = "earlier_specs"
@@ -100,7 +101,7 @@ class Study:
                 }
         for entry in records.values():
             if entry.task_id not in outcomes or entry.stored >= outcomes[entry.task_id].stored:
-                outcomes[entry.task_id] = entry.outcome
+                outcomes[entry.task_id] = Outcome(entry.row["status"], entry.stored)
         return outcomes
 
     def collect(self, spec: Spec, tasks: list[Task], text: str) -> list[str]:
@@ -171,9 +172,8 @@ class Study:
     def _sound_records(self) -> tuple[dict[Path, Entry], list[str]]:
         """The records by path; a damaged one is set aside, with a message."""
         entries, damaged = self.records()
-        bad = {path: unfinished_work.set_aside(path).name for path in damaged}
         return entries, [
-            f"{error}; set aside as {bad[path]}, its task is solved again"
+            f"{error}; set aside as {set_aside(path).name}, its task is solved again"
             for path, error in damaged.items()
         ]
 
