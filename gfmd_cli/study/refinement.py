@@ -113,8 +113,7 @@ def solve_on_grids(task: Task, context: SolveContext, watcher: Watcher) -> TaskS
     """
     sizes = _sizes(task)
     grids = watcher.notes.grids
-    are_first = [grid.points for grid in grids] == sizes[: len(grids)]
-    if not are_first or len(grids) == len(sizes):  # the notes are of other sizes
+    if [grid.points for grid in grids] != sizes[:-1][: len(grids)]:  # the notes are of other sizes
         grids = watcher.notes.grids = []
     solved: TaskSolution | None = None
     for points in sizes[len(grids) :]:

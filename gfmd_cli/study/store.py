@@ -30,7 +30,6 @@ from gfmd_cli.study.provenance import origin
 from gfmd_cli.study.reading import StudyFile, damage_named, open_study
 from gfmd_cli.study.result import Entry, Outcome, TaskResult
 from gfmd_cli.study.tasks import Task
-from gfmd_cli.study.unfinished_work import set_aside
 from gfmd_cli.study.writing import write_study
 
 EARLIER = "earlier_specs"
@@ -172,10 +171,11 @@ class Study:
     def _sound_records(self) -> tuple[dict[Path, Entry], list[str]]:
         """The records by path; a damaged one is set aside, with a message."""
         entries, damaged = self.records()
-        return entries, [
-            f"{error}; set aside as {set_aside(path).name}, its task is solved again"
-            for path, error in damaged.items()
-        ]
+        messages = []
+        for path, error in damaged.items():
+            bad = unfinished_work.set_aside(path)
+            messages.append(f"{error}; set aside as {bad.name}, its task is solved again")
+        return entries, messages
 
     def _is_complete(self, tasks: list[Task]) -> bool:
         """Whether no task is missing, and no record or unfinished checkpoint is left."""
