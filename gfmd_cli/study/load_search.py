@@ -205,7 +205,7 @@ def _with_errors_at_load(task: Task, solved: TaskSolution, slopes: _Slopes) -> N
     The other quantities change over it, at most in proportion to p.
     """
     name, units = LOADS[task.quantity].searched, _units(solved.scene)
-    estimate = solved.estimates[name]
+    estimates, estimate = solved.estimates, solved.estimates[name]
     least = min((chord[name] for chord in slopes.chords), default=0.0) / units[name]
     slope = least - slopes.uncertain
     value = estimate.continuum
@@ -214,9 +214,8 @@ def _with_errors_at_load(task: Task, solved: TaskSolution, slopes: _Slopes) -> N
         error = -log1p(-distance / value) * value / slope  # of ln p
         if error < log1p(LARGEST_ERROR):
             solved.pressure_error = expm1(error)
-    for other in solved.estimates.keys() - {name}:
+    for other in estimates.keys() - {name}:
         steepest = max((chord[other] for chord in slopes.chords), default=nan) / units[other]
-        estimates = solved.estimates
         estimates[other] = with_shift(estimates[other], steepest * solved.pressure_error)
 
 
