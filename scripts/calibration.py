@@ -38,7 +38,7 @@ from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.physics.surfaces import Surface
 from gfmd_cli.solvers.auto import Auto
 from gfmd_cli.solvers.nested_grids import solve_contact
-from gfmd_cli.study.refinement import free_border_share, scales_of
+from gfmd_cli.study.refinement import border_share, scales_of
 
 EXPONENTS = (0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0)
 THICKNESSES = (0.01, 0.03, 0.1)
@@ -343,7 +343,7 @@ def measure(case: Case, tolerance: float = 1e-6) -> dict:
                 "u_g": observables.u_g * height,
                 "perimeter": observables.perimeter,
                 "energy": observables.energy * stress * height,
-                "border": free_border_share(contact, solution),
+                "border": None if contact.is_periodic else border_share(contact, solution),
                 "texture": texture,
                 "status": solution.status,
                 "seconds": round(time.perf_counter() - begun, 3),

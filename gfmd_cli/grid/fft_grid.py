@@ -126,7 +126,7 @@ class Grid:
         """Sum over the grid of the products of two fields."""
         return self.total(float(np.vdot(one, other)))
 
-    def mean(self, values: Field) -> float:
+    def mean(self, values: Field | Mask) -> float:
         """Mean of a field, or of some of its values, over the grid; zero without any."""
         total, count = self.total(np.array([values.sum(), values.size]))
         return float(total / count) if count else 0.0

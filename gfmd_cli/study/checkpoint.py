@@ -90,10 +90,8 @@ class Checkpoint:
         intact = [slot for slot in slots if all(map(self._is_whole, slot.parts))]
         if not intact:
             return [], self.set_aside()
-        if intact[0] is slots[0]:
-            return intact, None
         note = f"{self.folder}: the newest state is damaged; the one before it is resumed"
-        return intact, note
+        return intact, None if intact[0] is slots[0] else note
 
     def exists(self) -> bool:
         """Whether a state is saved, whole or not."""

@@ -181,8 +181,7 @@ WEIGHTS = {
     ),
 }
 """Fractions of points in no bin, by the key of [output] that turns the histogram on."""
-WEIGHT_COLUMNS = tuple(column for columns in WEIGHTS.values() for column in columns)
-ROW_COLUMNS = (*COLUMNS, *WEIGHT_COLUMNS)
+ROW_COLUMNS = (*COLUMNS, *(column for columns in WEIGHTS.values() for column in columns))
 """All columns with one value a task."""
 TASK = Column("task", "index of the task", kind=int)
 TASK_ID = Column("task_id", "task by its content", "", str)

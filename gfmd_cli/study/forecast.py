@@ -6,7 +6,7 @@ import numpy as np
 
 from gfmd_cli.grid.plans import fast_length
 from gfmd_cli.physics.discretisation_error import MAX_AREA_EXPONENT, MAX_STRESS_EXPONENT
-from gfmd_cli.physics.indenters import MAX_POINTS, POINTS_ROUNDING, RigidSurface
+from gfmd_cli.physics.indenters import POINTS_ROUNDING, RigidSurface
 from gfmd_cli.solvers.multigrid import MAX_PIXEL_ASPECT
 from gfmd_cli.spec.models import AccuracyTable, OutputTable
 
@@ -25,7 +25,7 @@ BASE_BYTES = 240e6
 MIN_FIRST_POINTS = 64  # along x, on the first grid of "auto"; such a solve costs nothing
 MAX_CONVERGENT_EXPONENT = {"a_r": MAX_AREA_EXPONENT, "u_g": 4.0, "sigma_p": MAX_STRESS_EXPONENT}
 """Exponents n up to which finer grids approach a continuum value."""
-SOLVES_PER_SEARCH, SOLVES_PER_ACCURATE_SEARCH = 3.5, 4.5
+SOLVES_PER_SEARCH = {False: 3.5, True: 4.5}
 """Solves that a search of the pressure takes, those on coarser grids included, without and with
 [accuracy]: then each trial has two grids, and two more contacts give the slopes. The means over the
 tables of `scripts/load_searches.py --points 256` and of the same with `--accuracy` are 3.4 and 4.3,
@@ -81,30 +81,18 @@ def fields_of_levels(shape: tuple[int, int], sides: tuple[float, ...]) -> float:
     return ODD_FIELDS if any(count % 2 for count in shape) else 0.0
 
 
-def solves(is_searched: bool, is_accurate: bool) -> float:
-    """Number of solves of a task: its pressure is searched or given, with [accuracy] or without."""
-    if not is_searched:
-        return 1.0
-    return SOLVES_PER_ACCURATE_SEARCH if is_accurate else SOLVES_PER_SEARCH
-
-
+@lru_cache(maxsize=1024)
 def pairs(exponent: float | None, p_star: float, tolerance: float, boundary: str) -> float:
-    """Time of a solve in units of SECONDS_PER_PAIR times grid points."""
+    """Time of a solve in units of SECONDS_PER_PAIR times grid points: `PAIRS`, interpolated."""
     if exponent == 0:
         return 1.0
     n = UNKNOWN_EXPONENT[boundary] if exponent is None else exponent
-    tightness = 1 - 0.1 * float(np.log10(max(tolerance, 1e-14) / 1e-6))
-    return tightness * _measured_pairs(boundary, n, p_star)
-
-
-@lru_cache(maxsize=1024)
-def _measured_pairs(boundary: str, n: float, p_star: float) -> float:
-    """See `PAIRS`, interpolated."""
     table = PAIRS[boundary]
     by_pressure = [
         np.interp(n, list(table), ratios) for ratios in zip(*table.values(), strict=True)
     ]
-    return float(np.interp(np.log10(max(p_star, 1e-14)), DECADES, by_pressure))
+    tightness = 1 - 0.1 * float(np.log10(max(tolerance, 1e-14) / 1e-6))
+    return tightness * float(np.interp(np.log10(max(p_star, 1e-14)), DECADES, by_pressure))
 
 
 def first_grid(surface: RigidSurface) -> int:
@@ -125,7 +113,7 @@ def last_grid(
     exponent: float | None,
     p_star: float,
     boundary: str | None,
-    accuracy: AccuracyTable | None,
+    accuracy: AccuracyTable,
 ) -> int:
     """Points along x that an "auto" grid ends with, mostly within a factor of two.
 
@@ -142,12 +130,11 @@ def last_grid(
         "sigma_p": (0.03 * 3**n, max(0.5, min(2.0, 3.0 - n))),
     }
     doublings = [1 if boundary == "free" else 0]  # one grid gives no error there
-    for name, share in (accuracy.tolerances() if accuracy is not None else {}).items():
+    for name, share in accuracy.tolerances().items():
         error, order = typical[name]
         if n <= MAX_CONVERGENT_EXPONENT[name]:
             doublings.append(int(np.ceil((np.log2(error) - np.log2(share)) / order)))
     first = points = first_grid(surface)
-    largest = MAX_POINTS if accuracy is None else accuracy.max_points
-    while 2 * points <= min(first * 2 ** max(doublings), largest):
+    while 2 * points <= min(first * 2 ** max(doublings), accuracy.max_points):
         points *= 2
     return points

@@ -83,16 +83,14 @@ def solve_at_load(task: Task, context: SolveContext, watcher: Watcher) -> TaskSo
     for points in grids:
         is_last = points == task.points
         scene = task_scene(task, points, context)
-        reason = _out_of_reach(task, scene)
-        if reason and is_last:
-            raise InputError(reason)
-        if reason:
+        if reason := _out_of_reach(task, scene):
+            if is_last:
+                raise InputError(reason)
             continue
         search = PressureSearch(task, scene, *_start(task, scene, searches))
-        is_solved = solves.search(search)
-        if not is_solved and is_last:
-            return solves.latest()
-        if not is_solved:
+        if not solves.search(search):
+            if is_last:
+                return solves.latest()
             continue
         if points == measured_on and (search.succeeded or search.is_exhausted):
             slopes = solves.slopes(search)
@@ -185,8 +183,7 @@ def _units(scene: Scene) -> dict[str, float]:
 def _chords(root: Trial, trials: list[Trial]) -> list[dict[str, float]]:
     """See `_Slopes`; empty if a solve has not converged, or a neighbour is out of range."""
     neighbours = [trial for trial in trials if trial.is_neighbour]
-    is_complete = len(neighbours) == 2
-    if not (is_complete and all(trial.observables for trial in (root, *neighbours))):
+    if len(neighbours) < 2 or not all(trial.observables for trial in (root, *neighbours)):
         return []
     return [
         {
@@ -208,7 +205,7 @@ def _with_errors_at_load(task: Task, solved: TaskSolution, slopes: _Slopes) -> N
     The other quantities change over it, at most in proportion to p.
     """
     name, units = LOADS[task.quantity].searched, _units(solved.scene)
-    estimate = solved.estimates[name]
+    estimates, estimate = solved.estimates, solved.estimates[name]
     least = min((chord[name] for chord in slopes.chords), default=0.0) / units[name]
     slope = least - slopes.uncertain
     value = estimate.continuum
@@ -217,9 +214,8 @@ def _with_errors_at_load(task: Task, solved: TaskSolution, slopes: _Slopes) -> N
         error = -log1p(-distance / value) * value / slope  # of ln p
         if error < log1p(LARGEST_ERROR):
             solved.pressure_error = expm1(error)
-    for other in solved.estimates.keys() - {name}:
+    for other in estimates.keys() - {name}:
         steepest = max((chord[other] for chord in slopes.chords), default=nan) / units[other]
-        estimates = solved.estimates
         estimates[other] = with_shift(estimates[other], steepest * solved.pressure_error)
 
 
@@ -228,21 +224,15 @@ def _check_known(task: Task, solved: TaskSolution) -> None:
     estimate = solved.estimates.get(LOADS[task.quantity].searched)
     if estimate is None or isfinite(estimate.continuum):
         return
-    remedy = "leave out [accuracy] for the value on the grid"
     if solved.scene.has_voids:
-        raise InputError(
-            f"load.{task.quantity}: no continuum value is known with surface.missing = "
-            f'"void"; {remedy}'
-        )
-    if estimate.is_final:
-        raise InputError(
-            f"load.{task.quantity}: {LOADS[task.quantity].words} {estimate.verdict.explanation}; "
-            f"{remedy}"
-        )
-    raise InputError(
-        f"load.{task.quantity}: the continuum value is not known on a grid with "
-        f"{task.points} points along x; try a finer grid, or {remedy}"
-    )
+        reason = 'no continuum value is known with surface.missing = "void"; '
+    elif estimate.is_final:
+        reason = f"{LOADS[task.quantity].words} {estimate.verdict.explanation}; "
+    else:
+        reason = f"the continuum value is not known on a grid with {task.points} points along x; "
+        reason += "try a finer grid, or "
+    remedy = "leave out [accuracy] for the value on the grid"
+    raise InputError(f"load.{task.quantity}: {reason}{remedy}")
 
 
 def _grids(task: Task) -> list[int]:

@@ -33,12 +33,13 @@ def planned(task: Task) -> Row:
     """The columns that follow from the spec of a task."""
     surface, elastomer = task.surface, task.elastomer
     values = {table: getattr(task, table).parameters() for table in SWEPT}
+    checksums = {table: checksum for table, (_, _, checksum) in task.files.items()}
     return {
         **{each.column.name: each.cell(values[each.table]) for each in PARAMETERS},
         "surface": surface.label,
         "ensemble": surface.label_without({"seed"}),
-        "surface_sha256": task.surface_sha256,
-        "elastomer_sha256": task.elastomer_sha256,
+        "surface_sha256": checksums.get("surface", ""),
+        "elastomer_sha256": checksums.get("elastomer", ""),
         "dimension": surface.dimension,
         "x_first": surface.x_first,
         "rough": int(surface.rough),

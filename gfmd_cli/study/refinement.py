@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from gfmd_cli.errors import InputError
-from gfmd_cli.grid.arrays import Field, row_blocks
+from gfmd_cli.grid.arrays import Field
 from gfmd_cli.grid.fft_grid import Shape
 from gfmd_cli.grid.plans import are_estimated
 from gfmd_cli.grid.ranks import on_root
@@ -113,8 +113,7 @@ def solve_on_grids(task: Task, context: SolveContext, watcher: Watcher) -> TaskS
     """
     sizes = _sizes(task)
     grids = watcher.notes.grids
-    are_first = [grid.points for grid in grids] == sizes[: len(grids)]
-    if not are_first or len(grids) == len(sizes):  # the notes are of other sizes
+    if [grid.points for grid in grids] != sizes[:-1][: len(grids)]:  # the notes are of other sizes
         grids = watcher.notes.grids = []
     solved: TaskSolution | None = None
     for points in sizes[len(grids) :]:
@@ -225,13 +224,8 @@ def _solved_grid(solved: TaskSolution) -> SolvedGrid:
         u_g=measured.u_g * scene.h_std,
         perimeter=measured.perimeter,
         work=solved.solution.transforms * scene.grid.size,
-        border=free_border_share(contact, solved.solution),
+        border=None if contact.is_periodic else border_share(contact, solved.solution),
     )
-
-
-def free_border_share(contact: Contact, solution: Solution) -> float | None:
-    """Share of the border of the map in contact; None with a periodic boundary."""
-    return None if contact.is_periodic else border_share(contact, solution)
 
 
 def border_share(contact: Contact, solution: Solution) -> float:
@@ -302,14 +296,6 @@ def scales_of(scene: Scene, band_limited: bool) -> discretisation_error.Roughnes
         band_limited=band_limited,
         aspect=max(grid.spacings) / min(grid.spacings),
         highest=scene.highest,
-        plateau=_share_above(scene, scene.highest - discretisation_error.PLATEAU_DEPTH),
+        plateau=grid.mean(scene.height > scene.highest - discretisation_error.PLATEAU_DEPTH),
         repetitions=texture.repetitions,
     )
-
-
-def _share_above(scene: Scene, level: float) -> float:
-    """Share of the points of a surface above a level [h_std]."""
-    above = sum(
-        int(np.count_nonzero(scene.height[rows] > level)) for rows in row_blocks(scene.height)
-    )
-    return float(scene.grid.total(above)) / scene.grid.size

@@ -30,11 +30,6 @@ class Entry(NamedTuple):
     row: Mapping[str, Any]
     """Columns and histograms by name."""
 
-    @property
-    def outcome(self) -> Outcome:
-        """Status and output."""
-        return Outcome(self.row["status"], self.stored)
-
 
 @dataclass(frozen=True)
 class TaskResult:

@@ -171,16 +171,16 @@ def _check_stored(solved: list[Task], outcomes: dict[str, Outcome], path: Path) 
 
     Also where another run of the same tasks, with other output, came first.
     """
-    lacking = without_result(solved, outcomes)
-    if lost := {task.id for task in lacking} - set(outcomes):
+    lacking = {task.id for task in without_result(solved, outcomes)}
+    if lost := lacking - outcomes.keys():
         raise Interrupted(
             f"{path}: deleted or replaced during the run, with {count(len(lost), 'result')}; run "
             "again to solve what is missing"
         )
     if lacking:
         raise Interrupted(
-            f"another run solved {count(len({task.id for task in lacking}), 'task')} at the same "
-            "time, with other output; run again to add the output of this one"
+            f"another run solved {count(len(lacking), 'task')} at the same time, with other "
+            "output; run again to add the output of this one"
         )
 
 

@@ -144,7 +144,8 @@ def attempt(task: Task, parts: Path, context: SolveContext) -> Status:
 def _recorded_status(parts: Path, task: Task) -> Status | None:
     """The status in the record of a task, None without an intact record."""
     with suppress(StudyError):
-        return read_record_entry(record_path(parts, task.id, task.output.names())).outcome.status
+        path = record_path(parts, task.id, task.output.names())
+        return Status(read_record_entry(path).row["status"])
     return None
 
 
@@ -179,7 +180,7 @@ def _check_files(task: Task) -> None:
 
     Its content is read only if its version has changed, as by `touch` or a copy of the same file.
     """
-    for path, version, checksum in task.files:
+    for path, version, checksum in task.files.values():
         with suppress(OSError):  # a file that was deleted after it had been read
             now = file_version(path)
             if now != version and _digest(path, now) != checksum:

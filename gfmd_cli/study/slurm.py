@@ -117,8 +117,7 @@ def batch(
     options += [option(word) for word in sbatch_options]
     fresh = shards is not None
     if shards is None:
-        text = _stored(path, words)
-        shards = int(SHARDS.findall(text)[0])
+        text, shards = _stored(path, words)
     else:
         check_shards(shards, len(tasks))
         own = requirements(tasks, shards, int(named_options.get("cpus-per-task", 1)), limit)
@@ -152,21 +151,24 @@ def script(study: Path, words: list[str], shards: int, options: list[str]) -> st
     )
 
 
-def _stored(path: Path, words: list[str]) -> str:
-    """The script of the last submission. Raises InputError if there is none for this call."""
+def _stored(path: Path, words: list[str]) -> tuple[str, int]:
+    """The script of the last submission and its number of shards.
+
+    Raises InputError if there is none for this call.
+    """
     try:
         text = read_regular(path, MAX_BYTES).decode()
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: no script of an earlier submission; give --shards N") from error
-    study = STUDY.search(text)
-    if study is None or len(SHARDS.findall(text)) != 1:
+    study, shards = STUDY.search(text), SHARDS.findall(text)
+    if study is None or len(shards) != 1:
         raise InputError(f"{path}: not as `gfmd submit` wrote it; give --shards N for a new one")
     if study[1] != shlex.join(words):
         raise InputError(
             f"{path}: runs {study[1]}\nrequested: {shlex.join(words)}\n"
             "Repeat -o and --set as they were, or give --shards N for a new script."
         )
-    return text
+    return text, int(shards[0])
 
 
 def requirements(tasks: list[Task], shards: int, cpus: int, limit: float | None) -> dict[str, str]:

@@ -100,7 +100,7 @@ class Study:
                 }
         for entry in records.values():
             if entry.task_id not in outcomes or entry.stored >= outcomes[entry.task_id].stored:
-                outcomes[entry.task_id] = entry.outcome
+                outcomes[entry.task_id] = Outcome(entry.row["status"], entry.stored)
         return outcomes
 
     def collect(self, spec: Spec, tasks: list[Task], text: str) -> list[str]:
@@ -171,11 +171,11 @@ class Study:
     def _sound_records(self) -> tuple[dict[Path, Entry], list[str]]:
         """The records by path; a damaged one is set aside, with a message."""
         entries, damaged = self.records()
-        bad = {path: unfinished_work.set_aside(path).name for path in damaged}
-        return entries, [
-            f"{error}; set aside as {bad[path]}, its task is solved again"
-            for path, error in damaged.items()
-        ]
+        messages = []
+        for path, error in damaged.items():
+            bad = unfinished_work.set_aside(path)
+            messages.append(f"{error}; set aside as {bad.name}, its task is solved again")
+        return entries, messages
 
     def _is_complete(self, tasks: list[Task]) -> bool:
         """Whether no task is missing, and no record or unfinished checkpoint is left."""

@@ -20,6 +20,7 @@ from gfmd_cli.study import forecast
 LOAD_DIGITS = 14  # of a load that name its task: the last bit of a ladder depends on the machine
 MAX_TASKS = 100_000  # upper limit of a study, guards against typing errors
 MAX_COMBINATIONS = 2_000_000  # of all lists, of which paired lists choose a part
+WITH_FILES = ("surface", "elastomer")  # tables of the spec that may name a file
 
 
 @dataclass(frozen=True)
@@ -47,15 +48,11 @@ class Task:
     """Name of the task by its content, the output left out."""
     scene_id: str
     """Name of its surface, elastomer and grid by their content."""
-    surface_sha256: str
-    """Checksum of the file of the surface; "" without a file."""
-    elastomer_sha256: str
-    """Checksum of the table of the elastomer, likewise."""
     swept: tuple[str, ...]
     """Swept keys of surface, grid and solver, as words of the label."""
-    files: tuple[tuple[Path, Version, str], ...] = ()
-    """The files of surface and elastomer with their checksums, and their versions before these
-    were computed."""
+    files: dict[str, tuple[Path, Version, str]]
+    """The files of surface and elastomer, by table: path, version before its checksum was computed,
+    and checksum."""
 
     @property
     def auto(self) -> bool:
@@ -130,8 +127,9 @@ class Task:
 
     def seconds_at(self, p_star: float) -> float:
         """The same with a load of about this reduced pressure."""
-        is_searched = bool(models.LOADS[self.quantity].searched)
-        solves = forecast.solves(is_searched, self.accuracy is not None)
+        solves = 1.0
+        if models.LOADS[self.quantity].searched:
+            solves = forecast.SOLVES_PER_SEARCH[self.accuracy is not None]
         exponent, tolerance = self.elastomer.exponent, self.solver.tolerance
         pairs = forecast.pairs(exponent, p_star, tolerance, self.boundary)
         pairs = solves * pairs * self.solver.relative_time + forecast.OTHER_PAIRS
@@ -159,28 +157,21 @@ def _tasks(spec: models.Spec, *, suited: bool) -> list[Task]:
     for at, loads in spec.combinations():
         chosen = _chosen(spec, at)
         tables = {table: resolved[table][i] for table, i in at.items()}
-        tables |= {
-            table: tables[table] | {key: getattr(chosen[table], key)}
-            for table, key in (("surface", "edges"), ("grid", "boundary"))
-            if key in tables[table]
-        }
-        shared = chosen | {
-            "surface_sha256": tables["surface"].get("sha256", ""),
-            "elastomer_sha256": tables["elastomer"].get("sha256", ""),
-            "scene_id": digest([tables[name] for name in ("surface", "elastomer", "grid")]),
-            "swept": _swept_words(chosen, swept_keys),
-            "files": tuple(
-                (path, versions[path], tables[table]["sha256"])
-                for table in ("surface", "elastomer")
-                if (path := chosen[table].file) is not None
-            ),
+        for table, key in (("surface", "edges"), ("grid", "boundary")):
+            if key in tables[table]:
+                tables[table] = tables[table] | {key: getattr(chosen[table], key)}
+        scene_id = digest([tables[name] for name in ("surface", "elastomer", "grid")])
+        swept = _swept_words(chosen, swept_keys)
+        files = {
+            table: (path, versions[path], tables[table]["sha256"])
+            for table in WITH_FILES
+            if (path := chosen[table].file) is not None
         }
         for load in loads:
-            points = _points(spec, chosen, load)
-            surface, points_y = _cell(chosen, points)
+            surface, points, points_y = _cell(spec, chosen, load)
             task = Task(
                 index=len(tasks),
-                **shared | {"surface": surface},
+                **chosen | {"surface": surface},
                 points=points,
                 points_y=points_y,
                 quantity=spec.load.quantity,
@@ -189,6 +180,9 @@ def _tasks(spec: models.Spec, *, suited: bool) -> list[Task]:
                 output=spec.output,
                 accuracy=spec.accuracy,
                 id=_task_id(spec, resolved, tables, load),
+                scene_id=scene_id,
+                swept=swept,
+                files=files,
             )
             _check_unit(task)
             tasks.setdefault(task.id, task)  # loads may agree in all digits that count
@@ -198,7 +192,7 @@ def _tasks(spec: models.Spec, *, suited: bool) -> list[Task]:
 def _file_versions(spec: models.Spec) -> dict[Path, Version]:
     """The versions of the files of surfaces and elastomers. Raises InputError, with the key."""
     versions = {}
-    for table in ("surface", "elastomer"):
+    for table in WITH_FILES:
         for path in filter(None, (choice.file for choice in getattr(spec, table))):
             try:
                 versions[path] = file_version(path)
@@ -273,27 +267,23 @@ def _check_grid(surface: RigidSurface, grid: models.GridTable) -> None:
         on_cell.check_resolved(points, points_y)
 
 
-def _points(spec: models.Spec, chosen: dict[str, Any], load: float) -> int:
-    """Points along x of the cell; of an "auto" grid a forecast."""
-    surface, grid = chosen["surface"], chosen["grid"]
-    if grid.points != "auto":
-        return int(surface.copies * grid.points)
-    p_star = load if spec.load.quantity == "p_star" else forecast.P_STAR
-    exponent = chosen["elastomer"].exponent
-    return forecast.last_grid(surface, exponent, p_star, grid.boundary, spec.accuracy)
-
-
-def _cell(chosen: dict[str, Any], points: int) -> tuple[RigidSurface, int]:
-    """The surface on its cell, and the points along y of a grid of so many points along x.
+def _cell(spec: models.Spec, chosen: dict[str, Any], load: float) -> tuple[RigidSurface, int, int]:
+    """The surface on its cell, and the points along x and y; of an "auto" grid a forecast.
 
     Each "auto" grid has exactly twice the points of the one before, along y as well.
     """
     surface, grid = chosen["surface"], chosen["grid"]
     if grid.points != "auto":
-        return grid.on_cell(surface, points)
+        points = surface.copies * grid.points
+        on_cell, points_y = grid.on_cell(surface, points)
+        return on_cell, points, points_y
+    assert spec.accuracy is not None  # of every spec with an "auto" grid
+    p_star = load if spec.load.quantity == "p_star" else forecast.P_STAR
+    exponent = chosen["elastomer"].exponent
+    points = forecast.last_grid(surface, exponent, p_star, grid.boundary, spec.accuracy)
     first = forecast.first_grid(surface)
     on_cell, first_y = grid.on_cell(surface, first)
-    return on_cell, first_y * points // first if surface.dimension == 2 else 1
+    return on_cell, points, first_y * points // first if surface.dimension == 2 else 1
 
 
 def _task_id(

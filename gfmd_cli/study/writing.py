@@ -56,8 +56,7 @@ def write_study(
     for histogram in layout.HISTOGRAMS:
         if histogram.option in options:
             writer.histogram(file, histogram, task, rows)
-    groups = [group for group in layout.TASK_GROUPS if group.option in options]
-    with_arrays = {group.option for group in groups}
+    with_arrays = {group.option for group in layout.TASK_GROUPS}
     described = _on_finest_grids(entries)
     for index, entry in enumerate(entries):
         describes = described.get(entry.scene_id) == index
@@ -65,7 +64,7 @@ def write_study(
             result = result_of(index)
             if describes:
                 writer.scene(file, f"scenes/{scenes[entry.scene_id]}", result)
-            writer.arrays(file, index, groups, result)
+            writer.arrays(file, index, result)
 
 
 def _on_finest_grids(entries: Sequence[Entry]) -> dict[str, int]:
@@ -146,11 +145,9 @@ class _Writer(NamedTuple):
             write_checked(shown, kind, picture.heights.astype(np.float32))
             write_checked(shown, f"{kind}_sides", np.array(picture.sides))
 
-    def arrays(
-        self, file: Any, index: int, groups: list[layout.TaskGroup], result: TaskResult
-    ) -> None:
+    def arrays(self, file: Any, index: int, result: TaskResult) -> None:
         """The arrays of one task."""
-        for declared in groups:
+        for declared in layout.TASK_GROUPS:
             if arrays := result.arrays.get(declared.name):
                 group = file.create_group(f"{declared.name}/{index}")
                 shape = next(iter(arrays.values())).shape
