@@ -10,13 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from gfmd_cli.cli.messages import print_data, print_error, print_text
-from gfmd_cli.cli.options import (
-    FILE,
-    Command,
-    arguments_as_given,
-    output_option,
-    overrides_option,
-)
+from gfmd_cli.cli.options import FILE, Command, arguments_as_given, output_option, overrides_option
 from gfmd_cli.errors import InputError, typed
 from gfmd_cli.status import Status, counted
 from gfmd_cli.units import count, duration, left_out

@@ -55,7 +55,7 @@ class HeightMap:
     periodic: bool | None = None
     """Whether the map is periodic, None where the file does not state it."""
     notes: tuple[str, ...] = ()
-    """Warnings of the reader."""
+    """Warnings of the reader, "" for none."""
 
 
 def check_type(dtype: np.dtype[Any]) -> None:

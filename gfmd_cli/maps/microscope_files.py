@@ -103,7 +103,7 @@ def read_microscope_file(path: Path, dataset: str | None) -> HeightMap:
                 height_map = _read_channel(path, table, reader, dataset)
         elif dataset is not None:
             raise InputError(f"a table of positions holds one map; leave out dataset {dataset!r}")
-    return replace(height_map, notes=tuple(filter(None, (*height_map.notes, warning))))
+    return replace(height_map, notes=(*height_map.notes, warning))
 
 
 def _open_scan(path: Path, file: BinaryIO, readers: list[Any]) -> Any:
@@ -276,7 +276,7 @@ def _check_nova(lines: list[bytes]) -> None:
             "not applied: are the heights those of the table, or to be multiplied? Save them "
             "multiplied, with a factor of 1"
         )
-    if len(units) == 2 and units[0] != units[1] and len(set(map(in_metres, units))) > 1:
+    if len(set(map(in_metres, units))) > 1:
         raise InputError("'Unit Y' is not 'Unit X'; save both sides in the same unit")
 
 
