@@ -81,7 +81,8 @@ def _short_waves(heights: Field, beyond: Beyond) -> tuple[float, float]:
 def _ties(heights: Field, beyond: Beyond) -> float:
     """Fraction of the pairs of neighbours with the same height."""
     around = np.pad(heights, ((1, 0), (1, 0)), mode=beyond)
-    return float(np.mean([heights == around[:-1, 1:], heights == around[1:, :-1]]))
+    before = around[:-1, 1:], around[1:, :-1]
+    return float(np.mean([np.mean(heights == others) for others in before]))
 
 
 def _jumps(heights: Field, beyond: Beyond) -> float:

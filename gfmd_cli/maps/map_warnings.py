@@ -3,8 +3,6 @@
 Each public function returns a warning, or "" without one.
 """
 
-from typing import Any
-
 import numpy as np
 
 from gfmd_cli.grid.arrays import Field, row_blocks
@@ -375,14 +373,11 @@ def _often_equal(heights: Field) -> str:
 def single_points(topography: Topography) -> str:
     """Warn if single points, or strokes along one axis, are far above or below their neighbours."""
     is_map, singles, strokes = topography.heights.ndim == 2, 0, np.zeros((2, 2), int)
-    parts: list[Any] = [...]
-    if is_map:
-        rows = row_blocks(topography.heights)
-        parts = [slice(max(block.start - 1, 0), block.stop + 1) for block in rows]
     inner = slice(1, -1) if is_map else slice(None)
     usual = _usual_difference(topography)
-    for part in parts if usual else ():
-        heights = np.atleast_2d(topography.with_gaps(part))
+    for rows in row_blocks(topography.heights) if usual else ():
+        around = slice(max(rows.start - 1, 0), rows.stop + 1)
+        heights = np.atleast_2d(topography.with_gaps(around))
         for block, of_sign in ((heights, strokes[0]), (-heights, strokes[1])):
             own = block[inner, 1:-1]
             axes = [(block[inner, :-2], block[inner, 2:])]
