@@ -270,8 +270,6 @@ def shifted_lines(topography: Topography, spacing: tuple[float, ...]) -> str:
     dy, dx = spacing
     for lines, along, ratio in ((heights, "x", dy / dx), (heights.T, "y", dx / dy)):
         lag = max(1, round(ratio))  # points of a line as far apart as the lines
-        if lag >= lines.shape[1]:
-            continue
         step_y, step_x = (1 + points // (4 * FORM_POINTS) for points in lines.shape)
         halves = np.array_split(np.diff(lines[:, ::step_x], axis=0), 2, axis=1)
         known = np.array([np.isfinite(half).sum(axis=1) for half in halves])
