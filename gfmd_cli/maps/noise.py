@@ -41,9 +41,8 @@ def noisy(
     if min(heights.shape) < MIN_POINTS[heights.ndim]:
         return ""
     rows = np.atleast_2d(heights)
-    lines_along = {"x": rows, "y": rows.T} if heights.ndim == 2 else {"x": rows}
     noises, whole, left = {}, 0.0, 0.0
-    for (axis, all_lines), step in zip(lines_along.items(), reversed(spacing), strict=True):
+    for axis, all_lines, step in zip("xy", (rows, rows.T), reversed(spacing), strict=False):
         some = all_lines[:: 1 + len(all_lines) // (2 * SAMPLED_LINES)]
         steps, noises[axis] = np.diff(some), _noise(some)
         square = float(np.var(steps[np.isfinite(steps)])) if np.isfinite(steps).any() else np.nan
