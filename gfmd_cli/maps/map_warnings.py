@@ -272,8 +272,7 @@ def shifted_lines(topography: Topography, spacing: tuple[float, ...]) -> str:
         lag = max(1, round(ratio))  # points of a line as far apart as the lines
         step_y, step_x = (1 + points // (4 * FORM_POINTS) for points in lines.shape)
         halves = np.array_split(np.diff(lines[:, ::step_x], axis=0), 2, axis=1)
-        known = np.array([np.isfinite(half).sum(axis=1) for half in halves])
-        is_known = (known >= MIN_KNOWN).all(axis=0)
+        is_known = np.all([np.isfinite(half).sum(axis=1) >= MIN_KNOWN for half in halves], axis=0)
         differences = lines[::step_y, lag:] - lines[::step_y, :-lag]
         differences = differences[np.isfinite(differences)]
         inside = float(differences.std()) if differences.size else 0.0
