@@ -428,16 +428,14 @@ def _check_all_rows_read(file: BinaryIO, columns: int, rows: int) -> None:
     The reader skips lines with words, also in the table, where they would shift all rows below.
     """
     file.seek(0)
-    lengths = [len(line.split()) for line in file]
-    first = next((i for i, length in enumerate(lengths) if length == columns), 0)
-    last = len(lengths) - next((i for i, length in enumerate(lengths[::-1]) if length), 0)
-    empty = lengths[first:last].count(0)
-    if 0 < empty < rows - 1:
-        number = lengths.index(0, first) + 1
+    lengths = np.array([len(line.split()) for line in file])
+    first, last = int(np.argmax(lengths == columns)), np.flatnonzero(lengths)[-1]
+    empty = first + np.flatnonzero(lengths[first:last] == 0)
+    if 0 < empty.size < rows - 1:
         raise InputError(
-            f":{number}: an empty line in the table: several maps? Save each in its own file"
+            f":{empty[0] + 1}: an empty line in the table: several maps? Save each in its own file"
         )
-    is_one_map = lengths.count(columns) <= rows
+    is_one_map = np.count_nonzero(lengths == columns) <= rows
     rows_above = 0
     file.seek(0)
     for number, line in enumerate(file, 1):
