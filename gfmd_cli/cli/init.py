@@ -81,10 +81,8 @@ def surface(
     for path in paths:
         if path.suffix == ".toml":
             spec = read_spec(path, overrides)[0]
-            points, grid = max(
-                ((0 if grid.points == "auto" else grid.points, grid) for grid in spec.grid),
-                key=lambda pair: pair[0],
-            )
+            given = [0 if grid.points == "auto" else grid.points for grid in spec.grid]
+            points, grid = max(given), spec.grid[given.index(max(given))]
             surfaces = [grid.on_cell(each, points)[0] for each in spec.surface]
             names += [each.label for each in surfaces]
             summaries += [summarise(each, points) for each in surfaces]

@@ -10,13 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from gfmd_cli.cli.messages import print_data, print_error, print_text
-from gfmd_cli.cli.options import (
-    FILE,
-    Command,
-    arguments_as_given,
-    output_option,
-    overrides_option,
-)
+from gfmd_cli.cli.options import FILE, Command, arguments_as_given, output_option, overrides_option
 from gfmd_cli.errors import InputError, typed
 from gfmd_cli.status import Status, counted
 from gfmd_cli.units import count, duration, left_out
@@ -59,11 +53,10 @@ def status(
         words = arguments_as_given(path, output, overrides)
     if shards is not None:
         check_shards(shards, len(progress.tasks))
-    next_command = _next_command(progress, words)
     if as_json:
-        print_data(json.dumps(_as_data(progress, shards, next_command), indent=1) + "\n")
+        print_data(json.dumps(_as_data(progress, shards, words), indent=1) + "\n")
     else:
-        print_text("\n".join([*_lines(progress, shards), f"next: {next_command}"]))
+        print_text(_as_text(progress, shards, words))
 
 
 @click.command(cls=Command)
@@ -92,13 +85,12 @@ def collect(spec: Path, output: Path | None, overrides: tuple[str, ...]) -> None
         for note in damaged:
             print_error(f"gfmd: {note}")
     progress = progress_of_spec(resolved, study.path)
-    next_command = _next_command(progress, arguments_as_given(spec, output, overrides))
-    print_text("\n".join([*_lines(progress, None), f"next: {next_command}"]))
+    print_text(_as_text(progress, None, arguments_as_given(spec, output, overrides)))
     sys.exit(0 if progress.converged else 1)
 
 
-def _lines(progress: "StudyProgress", shards: int | None) -> list[str]:
-    """The state of a study as lines of text."""
+def _as_text(progress: "StudyProgress", shards: int | None, words: str) -> str:
+    """The state of a study, and the next command; `words` are the spec and its options."""
     lines = [f"{progress.study}: {count(len(progress.tasks), 'task')}: {counted(progress.counts)}"]
     for task in progress.tasks:
         name = f"task {task.task} {task.label}".rstrip()
@@ -124,11 +116,11 @@ def _lines(progress: "StudyProgress", shards: int | None) -> list[str]:
     lines += [f"  damaged, to be solved again: {name}" for name in progress.damaged]
     for index, counts in enumerate(progress.of_shards(shards or 0)):
         lines.append(f"  shard {index}/{shards}: {counted(counts)}")
-    return lines
+    return "\n".join([*lines, f"next: {_next_command(progress, words)}"])
 
 
 def _next_command(progress: "StudyProgress", words: str) -> str:
-    """The command to run next; `words` are the spec and its options."""
+    """The command to run next."""
     from gfmd_cli.study.slurm import SUFFIX
 
     if not progress.missing:
@@ -147,7 +139,7 @@ def _saved(task: int, saved: "SavedProgress") -> dict[str, Any]:
     return data | ({} if isfinite(saved.residual) else {"residual": None})  # JSON has no NaN
 
 
-def _as_data(progress: "StudyProgress", shards: int | None, next_command: str) -> dict[str, Any]:
+def _as_data(progress: "StudyProgress", shards: int | None, words: str) -> dict[str, Any]:
     """The same as plain data."""
     counts = progress.counts
     data: dict[str, Any] = {
@@ -162,7 +154,7 @@ def _as_data(progress: "StudyProgress", shards: int | None, next_command: str) -
         "records": progress.records,
         "others": progress.others,
         "damaged": progress.damaged,
-        "next": next_command,
+        "next": _next_command(progress, words),
     }
     if shards is not None:
         data["shards"] = [dict(counts) for counts in progress.of_shards(shards)]

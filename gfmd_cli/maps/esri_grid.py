@@ -37,11 +37,11 @@ def read_esri_grid(path: Path, dataset: str | None) -> HeightMap:
         lines = list(filter(np.size, (np.array(each.split(), float) for each in (line, *file))))
     _check_rows([len(each) for each in lines], *shape)
     heights = np.concatenate(lines).reshape(shape)[::-1]
-    missing = header.get("nodata_value", NO_DATA)
     sides = tuple(header["cellsize"] * points for points in shape)
-    heights = np.ma.masked_equal(heights, missing)
-    notes = (warning,) if warning else ()
-    return HeightMap(heights=heights, sides=sides, source="ESRI grid", periodic=False, notes=notes)
+    heights = np.ma.masked_equal(heights, header.get("nodata_value", NO_DATA))
+    return HeightMap(
+        heights=heights, sides=sides, source="ESRI grid", periodic=False, notes=(warning,)
+    )
 
 
 def _check_rows(counts: list[int], rows: int, columns: int) -> None:

@@ -44,16 +44,14 @@ def transmission(frequency: Field, cutoff: float) -> Field:
 
     `frequency` is 1 / wavelength along one axis; the fractions of both axes are multiplied.
     """
-    kept: Field = np.exp2(-((cutoff * frequency) ** 2))
-    return kept
+    return np.exp2(-((cutoff * frequency) ** 2))
 
 
 def _repeated(lines: Field, step: float, cutoff: float) -> Field:
     """Periodic lines, filtered along the last axis in Fourier space."""
     points = lines.shape[-1]
     kept = transmission(np.fft.rfftfreq(points, step), cutoff)
-    filtered: Field = np.fft.irfft(kept * np.fft.rfft(lines), points)
-    return filtered
+    return np.fft.irfft(kept * np.fft.rfft(lines), points)
 
 
 def _with_ends(lines: Field, step: float, cutoff: float) -> Field:

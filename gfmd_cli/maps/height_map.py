@@ -55,7 +55,7 @@ class HeightMap:
     periodic: bool | None = None
     """Whether the map is periodic, None where the file does not state it."""
     notes: tuple[str, ...] = ()
-    """Warnings of the reader."""
+    """Warnings of the reader, "" for none."""
 
 
 def check_type(dtype: np.dtype[Any]) -> None:
@@ -184,8 +184,7 @@ def _with_coordinates(file: Any, data: Any, bare: HeightMap) -> HeightMap:
     if len(steps) < len(axes):
         note = "the heights state a unit, which is not read: set surface.scale"
         return replace(bare, heights=heights, notes=(note,) if stated_unit(data) else ())
-    forward = tuple(slice(None, None, -1 if step < 0 else None) for step in steps)
-    heights = heights[forward]
+    heights = heights[tuple(slice(None, None, -1 if step < 0 else None) for step in steps)]
     sides = [abs(step) * points for step, points in zip(steps, heights.shape, strict=True)]
     metres = factor(repr(data.name), stated_unit(data))
     metric = [axis.metres for axis in axes if axis.metres]

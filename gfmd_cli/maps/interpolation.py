@@ -80,9 +80,9 @@ def _short_waves(heights: Field, beyond: Beyond) -> tuple[float, float]:
 
 def _ties(heights: Field, beyond: Beyond) -> float:
     """Fraction of the pairs of neighbours with the same height."""
-    before = (np.pad(lines, ((1, 0), (0, 0)), mode=beyond)[:-1] for lines in (heights, heights.T))
-    pairs = zip((heights, heights.T), before, strict=True)
-    return float(np.mean([np.mean(lines == others) for lines, others in pairs]))
+    around = np.pad(heights, ((1, 0), (1, 0)), mode=beyond)
+    before = around[:-1, 1:], around[1:, :-1]
+    return float(np.mean([np.mean(heights == others) for others in before]))
 
 
 def _jumps(heights: Field, beyond: Beyond) -> float:

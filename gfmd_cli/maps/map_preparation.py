@@ -45,8 +45,7 @@ def level(heights: Field, degree: Levelling, known: Mask | None = None) -> Field
         sizes = (basis_y.shape[1],) * 2 + (basis_x.shape[1],) * 2
         gram = products.reshape(sizes).transpose(0, 2, 1, 3)[terms][:, terms]
         coefficients[terms] = np.linalg.lstsq(gram, right, rcond=None)[0]
-    trend: Field = basis_y @ coefficients @ basis_x.T
-    return heights - trend.reshape(heights.shape)
+    return heights - (basis_y @ coefficients @ basis_x.T).reshape(heights.shape)
 
 
 def _polynomials(points: int, degree: int) -> Field:

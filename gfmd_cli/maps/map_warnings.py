@@ -3,8 +3,6 @@
 Each public function returns a warning, or "" without one.
 """
 
-from typing import Any
-
 import numpy as np
 
 from gfmd_cli.grid.arrays import Field, row_blocks
@@ -272,12 +270,9 @@ def shifted_lines(topography: Topography, spacing: tuple[float, ...]) -> str:
     dy, dx = spacing
     for lines, along, ratio in ((heights, "x", dy / dx), (heights.T, "y", dx / dy)):
         lag = max(1, round(ratio))  # points of a line as far apart as the lines
-        if lag >= lines.shape[1]:
-            continue
         step_y, step_x = (1 + points // (4 * FORM_POINTS) for points in lines.shape)
         halves = np.array_split(np.diff(lines[:, ::step_x], axis=0), 2, axis=1)
-        known = np.array([np.isfinite(half).sum(axis=1) for half in halves])
-        is_known = (known >= MIN_KNOWN).all(axis=0)
+        is_known = np.all([np.isfinite(half).sum(axis=1) >= MIN_KNOWN for half in halves], axis=0)
         differences = lines[::step_y, lag:] - lines[::step_y, :-lag]
         differences = differences[np.isfinite(differences)]
         inside = float(differences.std()) if differences.size else 0.0
@@ -375,14 +370,11 @@ def _often_equal(heights: Field) -> str:
 def single_points(topography: Topography) -> str:
     """Warn if single points, or strokes along one axis, are far above or below their neighbours."""
     is_map, singles, strokes = topography.heights.ndim == 2, 0, np.zeros((2, 2), int)
-    parts: list[Any] = [...]
-    if is_map:
-        rows = row_blocks(topography.heights)
-        parts = [slice(max(block.start - 1, 0), block.stop + 1) for block in rows]
     inner = slice(1, -1) if is_map else slice(None)
     usual = _usual_difference(topography)
-    for part in parts if usual else ():
-        heights = np.atleast_2d(topography.with_gaps(part))
+    for rows in row_blocks(topography.heights) if usual else ():
+        around = slice(max(rows.start - 1, 0), rows.stop + 1)
+        heights = np.atleast_2d(topography.with_gaps(around))
         for block, of_sign in ((heights, strokes[0]), (-heights, strokes[1])):
             own = block[inner, 1:-1]
             axes = [(block[inner, :-2], block[inner, 2:])]

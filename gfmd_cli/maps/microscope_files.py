@@ -103,7 +103,7 @@ def read_microscope_file(path: Path, dataset: str | None) -> HeightMap:
                 height_map = _read_channel(path, table, reader, dataset)
         elif dataset is not None:
             raise InputError(f"a table of positions holds one map; leave out dataset {dataset!r}")
-    return replace(height_map, notes=tuple(filter(None, (*height_map.notes, warning))))
+    return replace(height_map, notes=(*height_map.notes, warning))
 
 
 def _open_scan(path: Path, file: BinaryIO, readers: list[Any]) -> Any:
@@ -276,7 +276,7 @@ def _check_nova(lines: list[bytes]) -> None:
             "not applied: are the heights those of the table, or to be multiplied? Save them "
             "multiplied, with a factor of 1"
         )
-    if len(units) == 2 and units[0] != units[1] and len(set(map(in_metres, units))) > 1:
+    if len(set(map(in_metres, units))) > 1:
         raise InputError("'Unit Y' is not 'Unit X'; save both sides in the same unit")
 
 
@@ -428,16 +428,14 @@ def _check_all_rows_read(file: BinaryIO, columns: int, rows: int) -> None:
     The reader skips lines with words, also in the table, where they would shift all rows below.
     """
     file.seek(0)
-    lengths = [len(line.split()) for line in file]
-    first = next((i for i, length in enumerate(lengths) if length == columns), 0)
-    last = len(lengths) - next((i for i, length in enumerate(lengths[::-1]) if length), 0)
-    empty = lengths[first:last].count(0)
-    if 0 < empty < rows - 1:
-        number = lengths.index(0, first) + 1
+    lengths = np.array([len(line.split()) for line in file])
+    first, last = int(np.argmax(lengths == columns)), np.flatnonzero(lengths)[-1]
+    empty = first + np.flatnonzero(lengths[first:last] == 0)
+    if 0 < empty.size < rows - 1:
         raise InputError(
-            f":{number}: an empty line in the table: several maps? Save each in its own file"
+            f":{empty[0] + 1}: an empty line in the table: several maps? Save each in its own file"
         )
-    is_one_map = lengths.count(columns) <= rows
+    is_one_map = np.count_nonzero(lengths == columns) <= rows
     rows_above = 0
     file.seek(0)
     for number, line in enumerate(file, 1):

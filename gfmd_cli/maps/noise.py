@@ -1,7 +1,5 @@
 """White noise in the heights of a map, estimated from the differences of its points."""
 
-from typing import NamedTuple
-
 import numpy as np
 
 from gfmd_cli.grid.arrays import Field
@@ -30,15 +28,6 @@ roll-off is four times as long or more (scripts/unresolved_roughness.py --leakag
 MIN_EXCESS = 1.1  # rms gradient over that without noise; sound maps have up to 1.06
 
 
-class _Differences(NamedTuple):
-    """Mean squares [m^2] along one axis of a map."""
-
-    neighbours: float
-    """Difference of neighbours, less that of a tilt."""
-    noise: float
-    """White noise of the heights; 0 if there is no sign of it."""
-
-
 def noisy(
     topography: Topography, spacing: tuple[float, ...], scale: float, cutoff: float = 0.0
 ) -> str:
@@ -52,27 +41,24 @@ def noisy(
     if min(heights.shape) < MIN_POINTS[heights.ndim]:
         return ""
     rows = np.atleast_2d(heights)
-    lines_along = {"x": rows, "y": rows.T} if heights.ndim == 2 else {"x": rows}
-    along = {axis: _differences(lines) for axis, lines in lines_along.items()}
-    whole, left = (
-        sum(
-            (each.neighbours - share * each.noise) / step**2
-            for each, step in zip(along.values(), reversed(spacing), strict=True)
-        )
-        for share in (0, 2)  # two points of a difference, each with its noise
-    )
+    noises, whole, left = {}, 0.0, 0.0
+    for axis, all_lines, step in zip("xy", (rows, rows.T), reversed(spacing), strict=False):
+        some = all_lines[:: 1 + len(all_lines) // (2 * SAMPLED_LINES)]
+        steps, noises[axis] = np.diff(some), _noise(some)
+        square = float(np.var(steps[np.isfinite(steps)])) if np.isfinite(steps).any() else np.nan
+        whole += square / step**2
+        left += (square - 2 * noises[axis]) / step**2  # each of the two points has its noise
     if not whole > MIN_EXCESS**2 * left:
         return ""
     gradient = _Gradient(heights, spacing)
     kept = gradient.kept(cutoff) if cutoff else 1.0
     if not whole * kept > MIN_EXCESS**2 * left:
         return ""
-    lines, across = (extreme(along, key=lambda axis: along[axis].noise) for extreme in (min, max))
-    noise = along[across].noise
+    lines, noise = min(noises, key=lambda axis: noises[axis]), max(noises.values())
     rms = f"{scale * np.sqrt(noise):.2g} m (rms)"
     excess = np.sqrt(whole * kept / left) if left > 0 else np.inf
     what, remedy = f"white noise of {rms} in the heights", "average several scans"
-    if along[lines].noise < MIN_COMMON * noise:
+    if noises[lines] < MIN_COMMON * noise:
         what, remedy = f"random offsets of {rms} of the lines along {lines}", "align the lines"
     elif excess < MAX_EXCESS:
         shortest = ROUNDED_UP * gradient.cutoff(left / whole)
@@ -161,41 +147,35 @@ class _Gradient:
         return float(longest)
 
 
-def _differences(lines: Field) -> _Differences:
-    """Differences along the lines of a map, and their noise (the nugget of a variogram).
+def _noise(lines: Field) -> float:
+    """Variance [m^2] of white noise along the lines of a map (the nugget of a variogram), or 0.
 
     The mean square of h(x + r) - 2 h(x) + h(x - r) is 6 V plus a multiple of r^(2 H) for a
     self-affine surface with white noise of the variance V (with first differences: Matheron 1963).
     Three distances r, each the same multiple of the one before, give V. The mean square grows less
     with r beyond a roll-off, and more below a cut-off: the result is then too small, or negative.
     """
-    lines = lines[:: 1 + len(lines) // (2 * SAMPLED_LINES)]
-    steps = np.diff(lines)
-    neighbours = float(np.var(steps[np.isfinite(steps)])) if np.isfinite(steps).any() else np.nan
     first = _second(lines, 1)
     near = np.array([_second(lines, ratio) for ratio in RATIOS])
     if not (near > (1 - TOLERANCE) * first).all():  # a pattern of the map, or too few heights
-        return _Differences(neighbours, 0.0)
+        return 0.0
     if (near < (1 + TOLERANCE) * first).all():
         has_waves = _second(lines, lines.shape[1] // FAR) > (1 + MIN_GROWTH) * first
-        return _Differences(neighbours, first / 6 if has_waves else 0.0)
+        return first / 6 if has_waves else 0.0
     rise = np.maximum(near - first, 0.0)
     rest = np.array([_second(lines, ratio**2) for ratio in RATIOS]) - near
     if not (rest > rise).all():
-        return _Differences(neighbours, 0.0)
-    return _Differences(neighbours, max(float((first - rise**2 / (rest - rise)).min()), 0.0) / 6)
+        return 0.0
+    return max(float((first - rise**2 / (rest - rise)).min()), 0.0) / 6
 
 
 def _second(lines: Field, distance: int) -> float:
-    """Mean square of the second differences of points of a line at this distance."""
-    middle = lines[:, distance:-distance]
-    return _mean_square(lines[:, 2 * distance :] - 2 * middle + lines[:, : -2 * distance])
+    """Mean square of the second differences of points of a line at this distance.
 
-
-def _mean_square(differences: Field) -> float:
-    """Mean square of the known differences if they are Gaussian, NaN if they are too few.
-
-    From their mean absolute value, so that a few steps matter little.
+    From the mean absolute value, as of Gaussian ones, so that a few steps matter little. NaN if too
+    few are known.
     """
+    middle = lines[:, distance:-distance]
+    differences = lines[:, 2 * distance :] - 2 * middle + lines[:, : -2 * distance]
     known = np.abs(differences[np.isfinite(differences)])
     return float(np.pi / 2 * known.mean() ** 2) if known.size >= MIN_PAIRS else np.nan

@@ -64,7 +64,7 @@ def _slopes(heights: MaskedField, spacing: tuple[float, ...]) -> tuple[float, fl
     """
     z = np.ma.filled(heights, np.nan)
     number, sums = 0, np.zeros(2)
-    for block in row_blocks(z[1:]) if z[1:].size else []:
+    for block in row_blocks(z[1:]):
         rows = z[block.start : block.stop + 1]
         steps = [np.diff(rows, axis=axis) / step for axis, step in enumerate(spacing)]
         if z.ndim == 1:

@@ -69,24 +69,25 @@ class Region(SpecTable):
         return f"{' and '.join(parts) or 'all'} {self.unit}"
 
     def slices(self, shape: tuple[int, ...], spacing: tuple[float, ...] | None) -> Any:
-        """The part of an array of this shape. Raises ValueError where it leaves the map."""
-        if self.unit == "m" and spacing is None:
-            raise ValueError("the file does not state its sides: give the region in pixels")
+        """The part of an array of this shape. Raises InputError where it leaves the map."""
+        steps = spacing if self.unit == "m" else (1.0,) * len(shape)
+        if steps is None:
+            raise InputError(
+                "surface.region: the file does not state its sides: give the region in pixels"
+            )
         parts = []
-        for axis, points in enumerate(shape, -len(shape)):
-            name = AXES[axis]
-            step = 1.0 if self.unit == "pixels" or spacing is None else spacing[axis]
+        for name, points, step in zip(AXES[-len(shape) :], shape, steps, strict=True):
             bounds = getattr(self, name)
             first, last = (0, points) if bounds is None else (round(each / step) for each in bounds)
             if last > points or last - first < SMALLEST_MAP:
-                raise ValueError(
-                    f"{name} = {list(bounds or ())} {self.unit}: the map has {name} = 0 to "
-                    f"{points * step:g} {self.unit}, {points} points; a region has at least "
-                    f"{SMALLEST_MAP} of them"
+                raise InputError(
+                    f"surface.region: {name} = {list(bounds or ())} {self.unit}: the map has "
+                    f"{name} = 0 to {points * step:g} {self.unit}, {points} points; a region has "
+                    f"at least {SMALLEST_MAP} of them"
                 )
             parts.append(slice(first, last))
         if len(shape) == 1 and self.y is not None:
-            raise ValueError("a line profile has no y")
+            raise InputError("surface.region: a line profile has no y")
         return tuple(parts)
 
 
@@ -193,10 +194,7 @@ def _checked(data: HeightMap, region: Region | None, flip: bool, crop: bool) -> 
     spacing = _spacing(data, shape)
     part = data.heights
     if region is not None:
-        try:
-            part = part[region.slices(shape, spacing if data.metres else None)]
-        except ValueError as error:
-            raise InputError(f"surface.region: {error}") from error
+        part = part[region.slices(shape, spacing if data.metres else None)]
     if crop and part.ndim == 2:
         side = min(part.shape) // 2 * 2
         first = [(points - side) // 2 for points in part.shape]
@@ -214,7 +212,7 @@ def _checked(data: HeightMap, region: Region | None, flip: bool, crop: bool) -> 
         raise InputError(
             f"all of the {missing.size} heights are NaN, infinite or marked as missing"
         )
-    notes = data.notes
+    notes = tuple(filter(None, data.notes))
     if heights.ndim == 1 and data.sides is not None and data.periodic is False:
         first, last = np.flatnonzero(~missing)[[0, -1]]
         if SMALLEST_MAP <= last + 1 - first < heights.size:
@@ -224,14 +222,13 @@ def _checked(data: HeightMap, region: Region | None, flip: bool, crop: bool) -> 
     heights = np.ascontiguousarray(np.where(missing, 0.0, -heights if flip else heights))
     heights.flags.writeable = False
     kind = data.heights.dtype if data.heights.dtype.kind == "f" else float
-    precision = float(np.finfo(kind).eps)
-    checked = {
-        "heights": heights,
-        "missing": missing if missing.any() else None,
-        "notes": notes,
-    }
-    measures = {"spacing": spacing, "shape": shape, "precision": precision}
-    return Topography(**vars(data) | checked | measures)
+    return Topography(
+        **vars(data) | {"heights": heights, "notes": notes},
+        missing=missing if missing.any() else None,
+        spacing=spacing,
+        shape=shape,
+        precision=float(np.finfo(kind).eps),
+    )
 
 
 def ends_without_heights(first: int, last: int) -> str:

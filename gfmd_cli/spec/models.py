@@ -82,10 +82,7 @@ class GridTable(SpecTable):
 
 
 def with_boundary(
-    surface: RigidSurface,
-    elastomer: LinearElastomer,
-    grid: GridTable,
-    solver: AnySolver,
+    surface: RigidSurface, elastomer: LinearElastomer, grid: GridTable, solver: AnySolver
 ) -> tuple[RigidSurface, GridTable]:
     """The surface with the treatment of its edges, and the grid with its boundary.
 

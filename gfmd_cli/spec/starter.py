@@ -78,11 +78,8 @@ def starter_of_scan(
     scene = build_scene(repeated, spec.elastomer[0], repeated.smallest_grid())
     finished = text(scene.h_std, scene.delta_sigma, len(spec.elastomer), warnings)
     _checked(finished, path, overrides)
-    warnings = [
-        *warnings,
-        unresolved(short_wave_factor(used, spec.elastomer[0]), used.period_limit()),
-    ]
-    return finished, used.preparation(grid.boundary), list(filter(None, warnings))
+    waves = unresolved(short_wave_factor(used, spec.elastomer[0]), used.period_limit())
+    return finished, used.preparation(grid.boundary), [*warnings, *filter(None, [waves])]
 
 
 def _checked(text: str, path: Path, overrides: tuple[str, ...]) -> Spec:
