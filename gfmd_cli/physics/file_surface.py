@@ -545,7 +545,8 @@ def _warnings_on_heights(surface: FileSurface) -> tuple[str, ...]:
     shape, spacing = topography.heights.shape, surface._map_spacing()
     levelled = _filled(surface)
     corners = tuple(slice(None, None, n - 1) for n in shape)
-    subtracted = scale * topography.heights[corners] - surface._levelled()[corners]
+    unfilled = levelled if topography.missing is None else surface._levelled()
+    subtracted = scale * topography.heights[corners] - unfilled[corners]
     sides = tuple(step * (n - 1) for step, n in zip(spacing, shape, strict=True))
     filled_lines, sound = misread.filled_lines(topography)
     outliers, misread_map = map_warnings.outliers(sound), misread.misread(sound)
