@@ -87,21 +87,18 @@ class Series:
         """The series of curves that differ in their seed only: what its scale can show."""
         loads = by_load(record for item in items for record in item.curve.records)
         loads.sort(key=lambda seeds: float(np.mean([record["p_star"] for record in seeds])))
-        points = [_point(panel, seeds) for seeds in loads]
-        columns = [np.array(values) for values in zip(*points, strict=True)]
-        statuses = [worst(record["status"] for record in seeds) for seeds in loads]
-        y = columns[1]
-        visible = np.isfinite(y) & ((y > 0) | (panel.y_scale == "linear"))
-        details = list(map(_details, compress(loads, visible)))
+        points = np.array([_point(panel, seeds) for seeds in loads])
+        visible = np.isfinite(points[:, 1]) & ((points[:, 1] > 0) | (panel.y_scale == "linear"))
+        shown = list(compress(loads, visible))
+        statuses = [worst(record["status"] for record in seeds) for seeds in shown]
         style = items[0].style
         if len(items) > 1:
             sizes = [len(seeds) for seeds in loads]  # they differ in an unfinished study
             few = f"{min(sizes)} to " if min(sizes) < max(sizes) else ""
             style = replace(style, label=f"{style.label}, {few}{count(max(sizes), 'seed')}")
         theory = np.mean([getattr(item.theory, panel.column) for item in items], axis=0)
-        x, y, error, half_width = (column[visible] for column in columns)
-        visible_statuses = list(compress(statuses, visible))
-        return cls(style, x, y, error, half_width, visible_statuses, details, theory)
+        x, y, error, half_width = points[visible].T
+        return cls(style, x, y, error, half_width, statuses, list(map(_details, shown)), theory)
 
     def draw(self, plot: ColumnFigure, *, line: bool) -> None:
         """Draw points with error bars, the band of several seeds, and a line on request."""

@@ -258,11 +258,10 @@ class ColumnFigure(LegendFigure):
                 layer = PlotLayer("points", names, x[mask], y[mask], to_hex(style.colour), marker)
                 texts = list(compress(details, mask))
                 self.layers.append(replace(layer, error=error[:, mask], details=texts))
+            if missed and np.any(mask):
+                self.legend[missed] = Line2D([], [], **options | {"marker": marker, "color": "0.4"})
         self.legend[style.label] = Line2D([], [], marker=style.marker, **options)
         self.shared_name = style.heading
-        for missed, marker in SHORTFALL_MARKERS.items():
-            if missed in shortfalls:
-                self.legend[missed] = Line2D([], [], **options | {"marker": marker, "color": "0.4"})
 
     def band(self, style: CurveStyle, x: Field, low: Field, high: Field) -> None:
         """Draw the confidence band of a mean."""
