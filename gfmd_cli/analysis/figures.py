@@ -15,9 +15,8 @@ from gfmd_cli.analysis.compare import Comparison, best_of_all, einstein_predicti
 from gfmd_cli.analysis.curve_styles import CurveStyle, StyledCurve, seed_groups, with_styles
 from gfmd_cli.analysis.distribution_figure import continuum_figure, distribution_figures
 from gfmd_cli.analysis.ensemble import by_load, residual_of, spread_of
-from gfmd_cli.analysis.plotting import DASHED, THEORY, ColumnFigure, styled
+from gfmd_cli.analysis.plotting import DASHED, THEORY, ColumnFigure, styled, write_all
 from gfmd_cli.analysis.wording import contact_title, grid_size, in_si, quantity
-from gfmd_cli.files.atomic import make_folder
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.status import Status, worst
 from gfmd_cli.study.column import Row
@@ -146,10 +145,8 @@ def draw_all(comparison: Comparison, folder: Path) -> list[Path]:
 
     Raises SpaceError where the folder cannot be written.
     """
-    make_folder(folder)
     with styled():
-        drawn = study_figures(comparison, with_styles(comparison))
-        return [path for name, plot in drawn.items() for path in plot.write(folder / name)]
+        return write_all(study_figures(comparison, with_styles(comparison)), folder)
 
 
 def study_figures(comparison: Comparison, items: list[StyledCurve]) -> dict[str, ColumnFigure]:
