@@ -152,12 +152,10 @@ def _elastomer_names(curves: list[Curve]) -> dict[str, str]:
 
 def _elastomer_words(row: Row) -> list[str]:
     """The parameters of an elastomer; the thickness is a length, except of a slab."""
-    is_length = row["elastomer_kind"] != "slab" and not np.isnan(row["thickness"])
-    thickness = f"thickness={as_text(row['thickness'], 'm')}" if is_length else None
-    return [
-        thickness if thickness and each.key == "thickness" else each.word(row)
-        for each in OF_ELASTOMER
-    ]
+    words = {each.key: each.word(row) for each in OF_ELASTOMER}
+    if words["thickness"] and row["elastomer_kind"] != "slab":
+        words["thickness"] = f"thickness={as_text(row['thickness'], 'm')}"
+    return list(words.values())
 
 
 def distinct_labels(labels: list[str]) -> list[str]:
@@ -166,20 +164,19 @@ def distinct_labels(labels: list[str]) -> list[str]:
     The middle is left out, or the label is numbered where the rest is the same.
     """
     for tail in TAILS:
-        cut = [
-            label
-            if len(label) <= MAX_LABEL
-            else f"{label[: MAX_LABEL - tail - 1]}\N{HORIZONTAL ELLIPSIS}{label[-tail:]}"
-            for label in labels
-        ]
+        cut = [_shortened(label, tail) for label in labels]
         if len(set(cut)) == len(set(labels)):
             return cut
     numbers = {label: i for i, label in enumerate(dict.fromkeys(labels), 1)}
-    numbered = (f"{numbers[label]}: {label}" for label in labels)
-    return [
-        label if len(label) <= MAX_LABEL else f"{label[: MAX_LABEL - 1]}\N{HORIZONTAL ELLIPSIS}"
-        for label in numbered
-    ]
+    return [_shortened(f"{numbers[label]}: {label}", 0) for label in labels]
+
+
+def _shortened(label: str, tail: int) -> str:
+    """A label of at most MAX_LABEL characters, of a long one its first and its last `tail` ones."""
+    if len(label) <= MAX_LABEL:
+        return label
+    end = label[len(label) - tail :]
+    return f"{label[: MAX_LABEL - tail - 1]}\N{HORIZONTAL ELLIPSIS}{end}"
 
 
 def colours(count: int) -> list[Colour]:

@@ -144,8 +144,7 @@ class StressDistribution:
     @cached_property
     def cells(self) -> list[int]:
         """Points of the cells of all seeds, on each grid."""
-        sizes = (int(row["points"]) * int(row["points_y"]) for row in self.seeds[0])
-        return [len(self.seeds) * size for size in sizes]
+        return [len(self.seeds) * row["points"] * row["points_y"] for row in self.seeds[0]]
 
     @cached_property
     def grids(self) -> Field:
@@ -212,8 +211,8 @@ class StressDistribution:
     @property
     def error(self) -> Field:
         """Relative standard error of `density`: discretisation, counting, sampling."""
-        parts = (self.extrapolated.discretisation, self.extrapolated.counting, self.sampling)
-        return np.sqrt(sum((np.square(part) for part in parts), np.zeros(1)))
+        part = self.extrapolated
+        return np.sqrt(part.discretisation**2 + part.counting**2 + self.sampling**2)
 
 
 def _patches(row: Row) -> float:

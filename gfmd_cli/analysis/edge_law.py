@@ -168,15 +168,14 @@ def _line(
     x, y = np.log(middle[chosen]), part.log_density[chosen]
     own, shared = np.hypot(part.counting, stress.sampling)[chosen], part.discretisation[chosen]
     more = None if correction is None else correction[chosen]
-    line, count = straight_line(x, y, own, shared, more), len(fine)
+    line, others = straight_line(x, y, own, shared, more), len(fine) - 1
     without = fine.sum(axis=0) - fine
-    if count == 1 or not np.all(without > 0):
+    if not np.all(without > 0):  # as for a single seed
         return line
-    shifts = np.log(without / (count - 1)) - np.log(fine.mean(axis=0))
+    shifts = np.log(without / others) - np.log(fine.mean(axis=0))
     slopes = [straight_line(x, y + shift, own, shared, more).slope for shift in shifts]
-    scatter = (count - 1) * float(np.var(slopes)) + line.shared**2
-    known = count - 1
-    error = np.sqrt((known * scatter + PRIOR_SEEDS * line.error**2) / (known + PRIOR_SEEDS))
+    scatter = others * float(np.var(slopes)) + line.shared**2
+    error = np.sqrt((others * scatter + PRIOR_SEEDS * line.error**2) / (others + PRIOR_SEEDS))
     return replace(line, error=float(error))
 
 

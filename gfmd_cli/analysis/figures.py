@@ -15,9 +15,8 @@ from gfmd_cli.analysis.compare import Comparison, best_of_all, einstein_predicti
 from gfmd_cli.analysis.curve_styles import CurveStyle, StyledCurve, seed_groups, with_styles
 from gfmd_cli.analysis.distribution_figure import continuum_figure, distribution_figures
 from gfmd_cli.analysis.ensemble import by_load, residual_of, spread_of
-from gfmd_cli.analysis.plotting import DASHED, THEORY, ColumnFigure, styled
+from gfmd_cli.analysis.plotting import DASHED, THEORY, ColumnFigure, styled, write_all
 from gfmd_cli.analysis.wording import contact_title, grid_size, in_si, quantity
-from gfmd_cli.files.atomic import make_folder
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.status import Status, worst
 from gfmd_cli.study.column import Row
@@ -87,21 +86,18 @@ class Series:
         """The series of curves that differ in their seed only: what its scale can show."""
         loads = by_load(record for item in items for record in item.curve.records)
         loads.sort(key=lambda seeds: float(np.mean([record["p_star"] for record in seeds])))
-        points = [_point(panel, seeds) for seeds in loads]
-        columns = [np.array(values) for values in zip(*points, strict=True)]
-        statuses = [worst(record["status"] for record in seeds) for seeds in loads]
-        y = columns[1]
-        visible = np.isfinite(y) & ((y > 0) | (panel.y_scale == "linear"))
-        details = list(map(_details, compress(loads, visible)))
+        points = np.array([_point(panel, seeds) for seeds in loads])
+        visible = np.isfinite(points[:, 1]) & ((points[:, 1] > 0) | (panel.y_scale == "linear"))
+        shown = list(compress(loads, visible))
+        statuses = [worst(record["status"] for record in seeds) for seeds in shown]
         style = items[0].style
         if len(items) > 1:
             sizes = [len(seeds) for seeds in loads]  # they differ in an unfinished study
             few = f"{min(sizes)} to " if min(sizes) < max(sizes) else ""
             style = replace(style, label=f"{style.label}, {few}{count(max(sizes), 'seed')}")
         theory = np.mean([getattr(item.theory, panel.column) for item in items], axis=0)
-        x, y, error, half_width = (column[visible] for column in columns)
-        visible_statuses = list(compress(statuses, visible))
-        return cls(style, x, y, error, half_width, visible_statuses, details, theory)
+        x, y, error, half_width = points[visible].T
+        return cls(style, x, y, error, half_width, statuses, list(map(_details, shown)), theory)
 
     def draw(self, plot: ColumnFigure, *, line: bool) -> None:
         """Draw points with error bars, the band of several seeds, and a line on request."""
@@ -149,10 +145,8 @@ def draw_all(comparison: Comparison, folder: Path) -> list[Path]:
 
     Raises SpaceError where the folder cannot be written.
     """
-    make_folder(folder)
     with styled():
-        drawn = study_figures(comparison, with_styles(comparison))
-        return [path for name, plot in drawn.items() for path in plot.write(folder / name)]
+        return write_all(study_figures(comparison, with_styles(comparison)), folder)
 
 
 def study_figures(comparison: Comparison, items: list[StyledCurve]) -> dict[str, ColumnFigure]:

@@ -58,13 +58,11 @@ class ParameterIndex(xarray.Index):  # type: ignore[misc]
         cls, indexes: Sequence["ParameterIndex"], dim: Hashable, positions: Any = None
     ) -> "ParameterIndex":
         """The index of the tasks of several data sets, one after the other."""
-        names = indexes[0].variables
-        return cls(
-            {
-                name: xarray.Variable.concat([i.variables[name] for i in indexes], dim, positions)
-                for name in names
-            }
-        )
+        joined = {}
+        for name in indexes[0].variables:
+            parts = [each.variables[name] for each in indexes]
+            joined[name] = xarray.Variable.concat(parts, dim, positions)
+        return cls(joined)
 
     def equals(self, other: xarray.Index, **_: Any) -> bool:
         """Whether all parameters of all tasks are the same."""

@@ -1,6 +1,6 @@
 """Figures with their style, scales, legend and files. Only this module imports matplotlib."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from functools import partial
@@ -15,7 +15,7 @@ import numpy as np
 from gfmd_cli.analysis.curve_styles import MAX_NAMED, CurveStyle
 from gfmd_cli.analysis.selection import evenly
 from gfmd_cli.errors import INSTALL, InputError
-from gfmd_cli.files.atomic import check_place, target_of, write_whole
+from gfmd_cli.files.atomic import check_place, make_folder, target_of, write_whole
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.status import SHORTFALLS, TOLERANCE_NOT_REACHED, Status
 
@@ -113,6 +113,8 @@ class LegendFigure:
         self.legend: dict[str, Any] = {}
         self.shared_name = ""
         """The part of the names of all curves that their labels leave out."""
+        self.layers: list[PlotLayer] = []
+        """What scripts can draw anew."""
 
     def line_on(self, axes: Any, label: str, x: Field, y: Field, **style: Any) -> None:
         """Draw a line where y > 0 on some axes, with an entry of the legend."""
@@ -120,9 +122,17 @@ class LegendFigure:
         self.legend[label] = Line2D([], [], **style)
 
     @property
+    def curves(self) -> list[str]:
+        """The names of the curves, in their order."""
+        points = (layer for layer in self.layers if layer.kind == "points")
+        return list(dict.fromkeys(layer.names[0] for layer in points))
+
+    @property
     def heading(self) -> str:
-        """Heading of the legend."""
-        return self.shared_name
+        """Heading of the legend; it says how many curves the legend leaves out."""
+        curves = self.curves
+        named = f"{NAMED} of {len(curves)} curves are named" if len(curves) > MAX_NAMED else ""
+        return ", ".join(filter(None, (self.shared_name, named)))
 
     @property
     def entries(self) -> dict[str, Any]:
@@ -132,8 +142,10 @@ class LegendFigure:
 
     @property
     def named_entries(self) -> dict[str, Any]:
-        """The entries that the legend has in print."""
-        return self.entries
+        """The entries in print: of more than MAX_NAMED curves NAMED, the ends among them."""
+        entries, curves = self.entries, self.curves
+        left_out = set(curves) - set(evenly(curves, NAMED)) if len(curves) > MAX_NAMED else set()
+        return {name: handle for name, handle in entries.items() if name not in left_out}
 
     def _write_legend(self) -> None:
         """Write the legend, if there is any, above the axes, in as many rows as needed."""
@@ -180,8 +192,7 @@ class LegendFigure:
         return files
 
     def write_file(self, path: Path) -> None:
-        """Write one file, whole or not at all; see `check_figure`."""
-        check_figure(path)
+        """Write one file of a suffix that `check_figure` allows, whole or not at all."""
         self._save([path], dpi=200)
 
     def _save(self, files: Sequence[Path], dpi: int) -> None:
@@ -195,35 +206,20 @@ class LegendFigure:
             write_whole(target_of(file), image.getvalue())
 
 
+def write_all(figures: Mapping[str, LegendFigure], folder: Path) -> list[Path]:
+    """Write figures by their names, as PDF and PNG; return the paths. Raises SpaceError."""
+    make_folder(folder)
+    return [path for name, plot in figures.items() for path in plot.write(folder / name)]
+
+
 class ColumnFigure(LegendFigure):
     """A figure with one pair of axes, as wide as a printed column, and what it shows as data."""
 
     def __init__(self, x_label: str, y_label: str) -> None:
         super().__init__(WIDTH, HEIGHT)
         self.axes = self.figure.add_subplot(xlabel=x_label, ylabel=y_label)
-        self.layers: list[PlotLayer] = []
         self.second: tuple[str, float] | None = None
         """Label of an axis at the top, and its values over those of x."""
-
-    @property
-    def curves(self) -> list[str]:
-        """The names of the curves, in their order."""
-        points = (layer for layer in self.layers if layer.kind == "points")
-        return list(dict.fromkeys(layer.names[0] for layer in points))
-
-    @property
-    def heading(self) -> str:
-        """Heading of the legend; it says how many curves the legend leaves out."""
-        curves = self.curves
-        named = f"{NAMED} of {len(curves)} curves are named" if len(curves) > MAX_NAMED else ""
-        return ", ".join(filter(None, (self.shared_name, named)))
-
-    @property
-    def named_entries(self) -> dict[str, Any]:
-        """The entries in print: of more than MAX_NAMED curves NAMED, the ends among them."""
-        entries, curves = self.entries, self.curves
-        left_out = set(curves) - set(evenly(curves, NAMED)) if len(curves) > MAX_NAMED else set()
-        return {name: handle for name, handle in entries.items() if name not in left_out}
 
     def points(
         self,
@@ -258,11 +254,10 @@ class ColumnFigure(LegendFigure):
                 layer = PlotLayer("points", names, x[mask], y[mask], to_hex(style.colour), marker)
                 texts = list(compress(details, mask))
                 self.layers.append(replace(layer, error=error[:, mask], details=texts))
+            if missed and np.any(mask):
+                self.legend[missed] = Line2D([], [], **options | {"marker": marker, "color": "0.4"})
         self.legend[style.label] = Line2D([], [], marker=style.marker, **options)
         self.shared_name = style.heading
-        for missed, marker in SHORTFALL_MARKERS.items():
-            if missed in shortfalls:
-                self.legend[missed] = Line2D([], [], **options | {"marker": marker, "color": "0.4"})
 
     def band(self, style: CurveStyle, x: Field, low: Field, high: Field) -> None:
         """Draw the confidence band of a mean."""

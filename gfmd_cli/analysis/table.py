@@ -179,7 +179,7 @@ def plain(value: Any) -> Any:
 
 
 DECIMAL = 1e-4, 1e6
-"""Absolute values from which and up to which a number with an error has no power of ten."""
+"""Absolute values from which and up to which a number with an error, or its error, is decimal."""
 
 
 def plus_minus(value: float, error: float) -> str:
@@ -190,15 +190,10 @@ def plus_minus(value: float, error: float) -> str:
     least, largest = DECIMAL
     if value == 0 or least <= abs(value) < largest:
         digits = min(max(digits, 0), 12)
-        return f"{value:z.{digits}f} +- {_decimal(error, digits)}"
+        error_format = f".{digits}f" if least <= error < largest else ".1e"
+        return f"{value:z.{digits}f} +- {error:{error_format}}"
     digits += math.floor(math.log10(abs(value)))
     return f"{value:.{min(max(digits, 0), 12)}e} +- {error:.1e}"
-
-
-def _decimal(error: float, digits: int) -> str:
-    """An error with some decimals; one that is far smaller or larger, with a power of ten."""
-    least, largest = DECIMAL
-    return f"{error:.{digits}f}" if least <= error < largest else f"{error:.1e}"
 
 
 def ratio(value: str, reference: str) -> Callable[[Record], float]:

@@ -11,14 +11,13 @@ import numpy as np
 
 from gfmd_cli.analysis.compare import with_solvers
 from gfmd_cli.analysis.curve_styles import CurveStyle, distinct_styles, literal
-from gfmd_cli.analysis.plotting import SMALL, WIDTH, LegendFigure, log_scale, styled
+from gfmd_cli.analysis.plotting import SMALL, WIDTH, LegendFigure, log_scale, styled, write_all
 from gfmd_cli.analysis.selection import grouped
 from gfmd_cli.analysis.table import Group, Record, Table, TableColumn
 from gfmd_cli.analysis.tables import ELASTOMER, P_STAR, POINTS, RESIDUAL, STATUS
 from gfmd_cli.analysis.wording import contact_and_boundary, points_text
 from gfmd_cli.bench.file import Trace
 from gfmd_cli.bench.run import REFERENCE
-from gfmd_cli.files.atomic import make_folder
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.physics.observables import QUANTITIES
 from gfmd_cli.status import Status
@@ -102,13 +101,8 @@ def draw_bench(traces: list[Trace], folder: Path) -> list[Path]:
 
     Raises SpaceError where the folder cannot be written.
     """
-    make_folder(folder)
     with styled():
-        return [
-            path
-            for name, plot in bench_figures(traces).items()
-            for path in plot.write(folder / name)
-        ]
+        return write_all(bench_figures(traces), folder)
 
 
 def bench_figures(traces: list[Trace]) -> dict[str, LegendFigure]:

@@ -175,7 +175,6 @@ def _trace(
     outcome = {
         **{each.column.name: each.cell(values) for each in PARAMETERS if each.table == "solver"},
         "solver": solver.kind,
-        "tolerance": solver.tolerance,
         "nested": solver.nested,
         "steps": solution.steps,
         "residual": residual,

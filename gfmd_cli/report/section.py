@@ -15,7 +15,6 @@ from gfmd_cli.report.interactive import interactive
 from gfmd_cli.report.rendering import clean
 from gfmd_cli.report.theme import variable
 
-COMMENT = re.compile("<!--.*?-->", re.DOTALL)
 COLOUR = re.compile(r"#[0-9a-fA-F]{6}\b")
 NUMBER = re.compile(r"-?\d+\.\d{3,}")
 DROPPED = ("metadata", "style")  # elements; style.css has the rules of the latter
@@ -82,9 +81,8 @@ def drawing(figure: LegendFigure, name: str, label: str, caption: str) -> Drawin
 
 def _inline(svg: str, name: str, label: str) -> Markup:
     """An SVG file as an element of the page, with colours as variables and prefixed identifiers."""
-    svg = COMMENT.sub("", svg)  # they repeat the texts of the figure
     svg = svg.replace(' xmlns="http://www.w3.org/2000/svg"', "").replace("xlink:href", "href")
-    root = ElementTree.fromstring(svg)
+    root = ElementTree.fromstring(svg)  # without comments
     used = {value[1:] for part in root.iter() for value in part.attrib.values() if value[:1] == "#"}
     used |= set(re.findall(r"url\(#([^)]+)\)", svg))
     for part in root.iter():
