@@ -725,6 +725,14 @@ def test_two_grids_of_one_contact_add_the_continuum(invoke, tmp_path):
     assert any(label.startswith(in_continuum) for label in labels)
 
 
+def test_maps_of_solvers_that_differ_in_any_key_are_separate_and_named(invoke, tmp_path):
+    swept = ONE + "[solver]\nmax_steps = [500, 600]\n"
+    page = report(solved(invoke, tmp_path, swept))
+    titles = re.findall(r'<div class="pressures"><h3>(.*?)</h3>', page)
+    assert len(titles) == 2
+    assert ["max_steps=500" in titles[0], "max_steps=600" in titles[1]] == [True, True], titles
+
+
 def test_a_single_contact_is_told_in_the_singular(invoke, tmp_path):
     path = solved(invoke, tmp_path, ONE + "[solver]\nmax_steps = 1\nnested = false\n")
     (first, *_) = warnings(read_report_data(path, ""))

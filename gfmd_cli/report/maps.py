@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from gfmd_cli.analysis.compare import solver_of, with_solvers
 from gfmd_cli.analysis.curve_styles import rgb
 from gfmd_cli.analysis.plotting import HEIGHT, WIDTH, ColumnFigure, LegendFigure, shades
 from gfmd_cli.analysis.selection import evenly, grouped
@@ -81,12 +82,14 @@ def maps(data: ReportData) -> Section:
         rows_with_fields = [row for row in data.solved if row["task"] in tasks]
         contacts: list[Row] = []
         series = []
-        for rows in _chosen(rows_with_fields):
+        curves = _chosen(rows_with_fields)
+        titles = [contact_and_boundary(rows[0]) for rows in curves]
+        titles = with_solvers(titles, [rows[0] for rows in curves])
+        for title, rows in zip(titles, curves, strict=True):
             drawn = [(row, _contact_maps(study, row, data.prefix)) for row in rows]
             drawn = [(row, each) for row, each in drawn if each["drawings"]]
             contacts += [row for row, _ in drawn]
             if drawn:
-                title = contact_and_boundary(rows[0])
                 series.append({"title": title, "contacts": [each for _, each in drawn]})
     notes = [
         f"Shown: {len(contacts)} of {count(len(rows_with_fields), 'contact')} with stored fields "
@@ -105,8 +108,8 @@ def maps(data: ReportData) -> Section:
 
 
 def _chosen(stored: list[Row]) -> list[list[Row]]:
-    """At most MAX_CURVES curves, and pressures at equal distances of each."""
-    curves = grouped(stored, lambda row: (row["scene"], row["solver"], row["tolerance"]))
+    """At most MAX_CURVES curves, by all keys of their solvers; of each evenly spaced pressures."""
+    curves = grouped(stored, lambda row: (row["scene"], *solver_of(row)))
     chosen = evenly(list(curves.values()), MAX_CURVES)
     pressures = [sorted(rows, key=lambda row: float(row["p_star"])) for rows in chosen]
     return [evenly(rows, MAX_CONTACTS // len(chosen)) for rows in pressures]
