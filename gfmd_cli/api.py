@@ -33,7 +33,14 @@ from gfmd_cli.physics.indenters import SMALLEST_GRID
 from gfmd_cli.spec.models import Spec
 from gfmd_cli.spec.parse import read_spec, read_tables
 from gfmd_cli.status import Status, counted
-from gfmd_cli.study.context import Progress, Report, SolveContext, Watcher, WorkerOptions, ignore
+from gfmd_cli.study.context import (
+    ProgressEvent,
+    Report,
+    SolveContext,
+    Watcher,
+    WorkerOptions,
+    ignore,
+)
 from gfmd_cli.study.load_search import solve_at_load
 from gfmd_cli.study.measure import all_columns
 from gfmd_cli.study.plausibility import SEPARATOR
@@ -289,7 +296,7 @@ def run(
     path = resolved.study_path(None if study is None else Path(study))
     messages: list[str] = []
 
-    def watch(progress: Progress) -> None:
+    def watch(progress: ProgressEvent) -> None:
         report(progress)
         if progress.status is not None and progress.status.is_failure:
             messages.append(f"task {progress.task} ({progress.label}): {progress.message}")

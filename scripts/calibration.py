@@ -33,7 +33,7 @@ from gfmd_cli.physics.error_estimates import GridValues
 from gfmd_cli.physics.file_surface import FileSurface
 from gfmd_cli.physics.free_contact import SCENES
 from gfmd_cli.physics.indenters import Parabola, Wave
-from gfmd_cli.physics.observables import QUANTITIES, observe
+from gfmd_cli.physics.observables import MAIN_OBSERVABLES, observe
 from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.physics.surfaces import Surface
 from gfmd_cli.solvers.auto import Auto
@@ -481,11 +481,11 @@ def table(scored: list[Score]) -> None:
     print("                                 value +- error            continuum +- its error")
     print("                             cases coverage bar/error  cases coverage bar/error")
     for half in (True, False):
-        for quantity in QUANTITIES:
+        for quantity in MAIN_OBSERVABLES:
             for grids in (1, 2, 3):
                 label = f"{'fit' if half else 'verify'} {quantity} {grids} grid{'s'[: grids - 1]}"
                 line(label, lambda s: (s.fit, s.quantity, s.grids) == (half, quantity, grids))  # noqa: B023
-    for quantity in QUANTITIES:
+    for quantity in MAIN_OBSERVABLES:
         for n in sorted({*EXPONENTS, *FREE_EXPONENTS}):
             line(
                 f"verify {quantity} n={n:g}",

@@ -96,7 +96,7 @@ class Case:
 
 def full_contact_pressure(contact: Contact) -> float:
     """max(-K h), where the last gap closes."""
-    return -float(contact.elasticity(contact.height, contact.grid.empty()).min())
+    return -float(contact.apply_stiffness(contact.height, contact.grid.empty()).min())
 
 
 def cases(points: int, folder: Path) -> Iterator[Case]:

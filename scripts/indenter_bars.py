@@ -23,7 +23,7 @@ from pydantic import TypeAdapter
 
 from gfmd_cli import rows, run
 from gfmd_cli.physics.elastomers import Power
-from gfmd_cli.physics.observables import QUANTITIES
+from gfmd_cli.physics.observables import MAIN_OBSERVABLES
 from gfmd_cli.physics.scenes import build_scene
 from gfmd_cli.physics.surfaces import Surface
 from gfmd_cli.study.plausibility import MAX_FINEST_SHARE, finest_share
@@ -68,9 +68,10 @@ def scores(coarse: list[Row], fine: list[Row]) -> Iterator[tuple[str, bool]]:
         reference = references[row["load_value"]]
         if row["a_r"] == 1 or reference["a_r"] == 1:
             continue
-        for name, quantity in QUANTITIES.items():
+        for name, observable in MAIN_OBSERVABLES.items():
             unit, unit_of_reference = (
-                each[quantity.scale] if quantity.scale else 1.0 for each in (row, reference)
+                each[observable.unit_column] if observable.unit_column else 1.0
+                for each in (row, reference)
             )
             value, bar = (unit * row[f"{name}_continuum{end}"] for end in ("", "_error"))
             true, error = (
@@ -117,7 +118,7 @@ def main() -> None:
     if options.units:
         print_units(list(changes_of_unit(options.points, options.exponents)))
         return
-    print("shape | " + " | ".join(QUANTITIES))
+    print("shape | " + " | ".join(MAIN_OBSERVABLES))
     for surfaces, finest in ((LINES, options.line_reference), (ROUND, options.round_reference)):
         for surface in surfaces:
             held = defaultdict(list)
@@ -130,7 +131,7 @@ def main() -> None:
             label = ", ".join(map(str, surface.values()))
             shares = [
                 f"{100 * np.mean(held[name]):.1f} % ({len(held[name])})" if held[name] else "-"
-                for name in QUANTITIES
+                for name in MAIN_OBSERVABLES
             ]
             print(f"{label} | {' | '.join(shares)}", flush=True)
 

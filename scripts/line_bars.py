@@ -21,7 +21,7 @@ import numpy as np
 
 from gfmd_cli import rows, run
 from gfmd_cli.physics.discretisation_error import LINE_EXCESS
-from gfmd_cli.physics.observables import QUANTITIES
+from gfmd_cli.physics.observables import MAIN_OBSERVABLES
 
 POINTS, ROLLOFF = 64, 4
 PRESSURES = [0.01, 0.03, 0.1, 0.3, 1.0]
@@ -85,7 +85,7 @@ def main() -> None:
                 if not 0 < row["a_r"] < 1:
                     continue
                 excess[row["n"]].append((row["a_r"] - true["a_r"]) / (xi - finest_xi))
-                references = {name: true[name] for name in QUANTITIES}
+                references = {name: true[name] for name in MAIN_OBSERVABLES}
                 references["a_r"] -= LINE_EXCESS * row["n"] * finest_xi
                 for name, reference in references.items():
                     if row[f"{name}_verdict"] == "regular":

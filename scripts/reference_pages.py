@@ -21,15 +21,15 @@ from click.testing import CliRunner
 
 from gfmd_cli.cli import main
 from gfmd_cli.spec.check import DEFAULT_KINDS, MODELS, REQUIRED, kinds_of
-from gfmd_cli.spec.models import SWEPT, Ladder
+from gfmd_cli.spec.models import SWEPT, GeometricSequence
 from gfmd_cli.spec.schema import spec_schema
 from gfmd_cli.study.column import Column
 from gfmd_cli.study.columns import (
     AUTOCORRELATIONS,
-    CONTRACT,
-    DETAILS,
+    DETAIL_COLUMNS,
     FIELDS,
     HISTOGRAMS,
+    MAIN_COLUMNS,
     PARAMETER_COLUMNS,
     SHELLS,
     SPECTRA,
@@ -155,7 +155,11 @@ def configuration() -> str:
             text = re.sub(r"^Table \\\[\w+\\\](: |\.)", "", about(model))
             parts += [text[:1].upper() + text[1:], keys(model)]
         if name == "load":
-            parts += ["### load: a geometric sequence", about(Ladder), keys(Ladder)]
+            parts += [
+                "### load: a geometric sequence",
+                about(GeometricSequence),
+                keys(GeometricSequence),
+            ]
     return "\n\n".join(part for part in parts if part)
 
 
@@ -202,7 +206,13 @@ def parameters() -> str:
 def distributions() -> str:
     """Densities in bins, and the fractions outside the bins."""
     rows = [
-        (f"`{h.name}`", f"`{h.axis}`", f"`{h.option}`", escaped(h.meaning), escaped(h.axis_meaning))
+        (
+            f"`{h.name}`",
+            f"`{h.axis}`",
+            f"`{h.output_key}`",
+            escaped(h.meaning),
+            escaped(h.axis_meaning),
+        )
         for h in HISTOGRAMS
     ]
     densities = table(
@@ -215,8 +225,8 @@ MAKERS = {
     "configuration": configuration,
     "examples": examples,
     "commands": commands,
-    "contract": lambda: columns(CONTRACT),
-    "details": lambda: columns(DETAILS),
+    "contract": lambda: columns(MAIN_COLUMNS),
+    "details": lambda: columns(DETAIL_COLUMNS),
     "parameters": parameters,
     "distributions": distributions,
     "scenes": lambda: columns(SHELLS),

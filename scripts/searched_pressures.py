@@ -24,7 +24,7 @@ from markdown_tables import print_head, print_row
 
 from gfmd_cli.api import solve
 from gfmd_cli.errors import InputError
-from gfmd_cli.physics.observables import QUANTITIES
+from gfmd_cli.physics.observables import MAIN_OBSERVABLES
 
 AREAS = (0.003, 0.95)
 GAPS = (0.01, 2.0)
@@ -113,7 +113,7 @@ def results(arguments: argparse.Namespace) -> Iterator[tuple[str, str, int, floa
                 row = columns(case, points, 1e-3)
                 if row is None:
                     continue
-                for name in ("pressure", *QUANTITIES):
+                for name in ("pressure", *MAIN_OBSERVABLES):
                     exact = values(reference, name)[0]
                     value, bar = values(row, name)
                     if name != SEARCHED[case.quantity] and np.isfinite(exact):

@@ -32,7 +32,7 @@ from gfmd_cli import rows
 from gfmd_cli.analysis.compare import Curve
 from gfmd_cli.analysis.distribution import StressDistribution
 from gfmd_cli.analysis.ensemble import spread_of
-from gfmd_cli.physics.observables import LOGARITHMIC_EDGES, QUANTITIES, geometric_middles
+from gfmd_cli.physics.observables import LOGARITHMIC_EDGES, MAIN_OBSERVABLES, geometric_middles
 
 Seeds = list[list[dict[str, Any]]]  # rows of each seed, grids rising
 SIZES, GROUPINGS = (1, 2, 3, 4, 8), 20
@@ -52,7 +52,7 @@ def held(group: Seeds, others: Seeds) -> dict[str, Any]:
         change = np.abs(density.extrapolated.log_density - reference.extrapolated.log_density)
         answers["Pr"] = np.where(np.isfinite(change), share * change <= density.error, np.nan)
     if len(group) > 1:
-        for name in QUANTITIES:
+        for name in MAIN_OBSERVABLES:
             spread = spread_of([contacts[-1][name] for contacts in group])
             change = abs(spread.mean - np.mean([contacts[-1][name] for contacts in others]))
             answers[name] = share * change <= spread.half_width
@@ -68,7 +68,7 @@ def main() -> None:
         for row in rows(path):
             contacts[row["n"], round(row["p_star"], 9)][row["seed"]].append(row)
     sigma, draw = geometric_middles(LOGARITHMIC_EDGES), np.random.default_rng(0)
-    print_head("n", "p*", "seeds", *QUANTITIES, "Pr(sigma)", "worst")
+    print_head("n", "p*", "seeds", *MAIN_OBSERVABLES, "Pr(sigma)", "worst")
     for (n, p_star), by_seed in contacts.items():
         seeds = [sorted(each, key=lambda row: row["points"]) for each in by_seed.values()]
         for size in (size for size in SIZES if size < len(seeds)):
@@ -82,7 +82,9 @@ def main() -> None:
                     for name, answer in held(group, others).items():
                         answers[name].append(answer)
             bins = np.array(answers.pop("Pr"))
-            cells = [f"{np.mean(answers[q]):.0%}" if q in answers else "–" for q in QUANTITIES]
+            cells = [
+                f"{np.mean(answers[q]):.0%}" if q in answers else "–" for q in MAIN_OBSERVABLES
+            ]
             known = np.isfinite(bins)
             resolved = np.flatnonzero(known.mean(axis=0) >= 0.5)
             density = worst = "–"

@@ -21,7 +21,7 @@ from markdown_tables import print_head, print_row
 from gfmd_cli import rows, run
 from gfmd_cli.analysis.selection import grouped
 from gfmd_cli.physics import discretisation_error
-from gfmd_cli.physics.observables import QUANTITIES
+from gfmd_cli.physics.observables import MAIN_OBSERVABLES
 
 POINTS = 64
 EXPONENTS = [0.5, 1.0, 2.0]
@@ -127,7 +127,7 @@ def errors(heights: np.ndarray, finest: int, folder: Path) -> list[tuple[int, st
     for contact in contacts.values():
         *coarse, fine = sorted(contact, key=lambda row: row["points"])
         for grids, row in enumerate(coarse, 1):
-            for name in QUANTITIES:
+            for name in MAIN_OBSERVABLES:
                 error = row[f"{name}_continuum"] - fine[f"{name}_continuum"]
                 ratios.append((grids, name, abs(error) / row[f"{name}_continuum_error"]))
     return ratios
@@ -144,7 +144,7 @@ def main() -> None:
     if arguments.laws:
         for limit in ("MAX_REPETITIONS", "MAX_PLATEAU", "MAX_HIGHEST"):
             setattr(discretisation_error, limit, np.inf)
-    heads = [f"{grids}: {name}" for grids in (1, 2) for name in QUANTITIES]
+    heads = [f"{grids}: {name}" for grids in (1, 2) for name in MAIN_OBSERVABLES]
     print("bars that hold of those given, largest error over its bar")
     print_head("kind", *heads)
     for kind in arguments.kinds or KINDS:

@@ -4,7 +4,7 @@ import numpy as np
 
 from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.physics.elastomers import HalfSpace, Layer, Power
-from gfmd_cli.physics.free_contact import FreeContact, FreeElasticity
+from gfmd_cli.physics.free_contact import FreeCompliance, FreeContact
 
 ELASTOMERS = [
     Power(n=0),
@@ -32,8 +32,10 @@ def oblong_contact(elastomer, pressure=0.1, *, void=False):
     grid = Grid(20, 2, 20 * 0.3, points_y=17, length_y=17 * 0.2)
     height = np.random.default_rng(4).standard_normal(grid.shape)
     may_touch = np.random.default_rng(8).random(grid.shape) < 0.7 if void else None
-    free = FreeElasticity(elastomer, grid, 1.0)
-    return FreeContact(grid, height, np.empty(0), pressure, may_touch=may_touch, free=free)
+    compliance = FreeCompliance(elastomer, grid, 1.0)
+    return FreeContact(
+        grid, height, np.empty(0), pressure, may_touch=may_touch, compliance=compliance
+    )
 
 
 def compliance_matrix(elastomer, grid):

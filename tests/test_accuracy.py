@@ -43,7 +43,7 @@ mean_gap = 0.01
 contact_area = 0.05
 """,
 )
-QUANTITIES = ("a_r", "sigma_p", "u_g")
+MAIN_OBSERVABLES = ("a_r", "sigma_p", "u_g")
 
 
 HOLED = """\
@@ -70,7 +70,7 @@ def test_a_map_with_voids_has_no_error_bars(rows_of, tmp_path, missing, verdict)
     np.save(tmp_path / "holed.npy", heights)
     keys = (f'surface.missing="{missing}"', 'surface.interpolation="fourier"')
     (row,) = rows_of(*keys, text=HOLED)
-    assert [row[f"{name}_verdict"] for name in QUANTITIES] == [verdict] * 3
+    assert [row[f"{name}_verdict"] for name in MAIN_OBSERVABLES] == [verdict] * 3
 
 
 def test_gaps_below_the_heights_of_voids_have_errors_too(rows_of, tmp_path):
@@ -208,12 +208,12 @@ def test_the_membrane_on_a_paraboloid_has_its_exact_area_within_the_bar(rows_of,
 def test_a_given_grid_gets_errors_where_they_are_asked_for(rows_of):
     (row,) = rows_of("grid.points=128", "accuracy.mean_gap=1e-9")
     assert (row["status"], row["points"], row["grid"]) == ("converged", 128, "given")
-    assert all(row[f"{name}_error"] > 0 for name in QUANTITIES)
+    assert all(row[f"{name}_error"] > 0 for name in MAIN_OBSERVABLES)
     plain = SPEC.partition("[accuracy]")[0]
     (other,) = rows_of("grid.points=128", text=plain, name="plain.h5")
-    assert all(np.isnan(other[f"{name}_error"]) for name in QUANTITIES)
-    assert [other[name] for name in QUANTITIES] == pytest.approx(
-        [row[name] for name in QUANTITIES], rel=1e-5
+    assert all(np.isnan(other[f"{name}_error"]) for name in MAIN_OBSERVABLES)
+    assert [other[name] for name in MAIN_OBSERVABLES] == pytest.approx(
+        [row[name] for name in MAIN_OBSERVABLES], rel=1e-5
     )
 
 
@@ -267,7 +267,9 @@ def test_pressures_share_the_scene_of_the_finest_grid(rows_of, monkeypatch):
     assert built == [130, 64, 128] * 2  # 65 points are odd
     alone = [rows_of("grid.points=128", f"load.p_star={p}", name=f"{p}.h5") for p in (0.05, 0.2)]
     for (row,), shared in zip(alone, together[::2], strict=True):
-        assert [row[name] for name in QUANTITIES] == [shared[name] for name in QUANTITIES]
+        assert [row[name] for name in MAIN_OBSERVABLES] == [
+            shared[name] for name in MAIN_OBSERVABLES
+        ]
 
 
 def test_nearly_full_contact_on_a_second_grid_is_contact(rows_of):
@@ -534,10 +536,10 @@ def test_the_errors_of_equal_values_remain_in_their_mean():
 def test_equal_values_without_errors_have_no_interval():
     """Their scatter is unknown, not zero, also where it is rounded."""
     row = {"p_star": 0.1, "status": Status.CONVERGED, "load": "p_star", "a_r": 0.1}
-    row |= {"sigma_p": 1.0, "u_g": 0.7} | {f"{name}_error": np.nan for name in QUANTITIES}
+    row |= {"sigma_p": 1.0, "u_g": 0.7} | {f"{name}_error": np.nan for name in MAIN_OBSERVABLES}
     assert np.std([0.1] * 3) != 0
     means = Ensemble([row] * 3).means()
-    assert all(np.isnan(means[f"{name}_confidence"]) for name in QUANTITIES)
+    assert all(np.isnan(means[f"{name}_confidence"]) for name in MAIN_OBSERVABLES)
     assert means["a_r_mean"] == pytest.approx(0.1)
 
 

@@ -43,7 +43,7 @@ def test_units_and_positions_give_a_scan_in_metres(array):
     read = read_topography(array())
     assert read.heights == pytest.approx(1e-9 * HEIGHTS, rel=1e-9, abs=0)
     assert read.spacing == pytest.approx((0.25e-6, 0.5e-6))
-    assert (read.metres, read.metric_heights, read.periodic) == (True, True, False)
+    assert (read.metric_sides, read.metric_heights, read.periodic) == (True, True, False)
     surface = FileSurface(path=array())
     assert surface.sides == pytest.approx((3e-6, 8e-6))
     assert surface.levelling() == "plane"
@@ -189,7 +189,7 @@ def test_a_field_of_a_study_has_the_sides_and_the_boundary_of_its_contact(
     read = read_topography(tmp_path / "study.h5")
     assert np.ptp(read.heights - 1e-9 * HEIGHTS) < 1e-20
     assert read.spacing == pytest.approx((0.25e-6, 0.5e-6))
-    assert (read.metres, read.metric_heights) == (True, True)
+    assert (read.metric_sides, read.metric_heights) == (True, True)
     assert read.periodic == (boundary == "periodic")
 
 
@@ -206,4 +206,4 @@ def test_attributes_may_be_text_of_any_kind(array, unit):
 
 def test_an_empty_attribute_states_no_unit(array):
     read = read_topography(array(units=dict.fromkeys(UNITS, h5py.Empty("S1"))))
-    assert (read.spacing, read.metres) == ((0.25, 0.5), False)
+    assert (read.spacing, read.metric_sides) == ((0.25, 0.5), False)

@@ -11,7 +11,7 @@ from gfmd_cli.bench.file import Trace, read_bench, write_bench
 from gfmd_cli.bench.results import bench_table, contact_of, draw_bench, solver_names
 from gfmd_cli.bench.run import REFERENCE, run_bench, solve_reference, solvers_to_compare
 from gfmd_cli.physics.free_contact import build_free_scene
-from gfmd_cli.physics.observables import QUANTITIES, observe
+from gfmd_cli.physics.observables import MAIN_OBSERVABLES, observe
 from gfmd_cli.physics.scenes import build_scene
 from gfmd_cli.solvers.dual import Dual
 from gfmd_cli.solvers.nested_grids import solve_contact
@@ -203,7 +203,7 @@ def test_a_bench_is_stored_with_labels_and_read_back(spec_of, tmp_path):
         assert data["seconds"].attrs["units"] == "s"
         assert all(data[name].attrs["long_name"] for name in data.variables)
         assert data.attrs["solver"] == "ccg"
-        assert {f"{name}_reference" for name in QUANTITIES} < set(data.attrs)
+        assert {f"{name}_reference" for name in MAIN_OBSERVABLES} < set(data.attrs)
     with h5py.File(path) as file:
         assert file.attrs["spec_text"] == SPEC
         assert {"software_version", "machine", "date", "spec_digest"} < set(file.attrs)

@@ -52,7 +52,7 @@ def test_it_is_that_of_a_dense_solve(n):
     contact = scene.contact(0.2)
     touching, _ = solved(scene, 0.2, 1e-6)
     units = np.eye(contact.grid.size).reshape(-1, *contact.grid.shape)
-    matrix = [contact.elasticity(unit, out=np.empty_like(unit)).ravel() for unit in units]
+    matrix = [contact.apply_stiffness(unit, out=np.empty_like(unit)).ravel() for unit in units]
     free = ~touching.ravel()
     w = np.linalg.solve(np.array(matrix)[np.ix_(free, free)], np.ones(free.sum()))
     exact = contact.grid.size / w.sum()

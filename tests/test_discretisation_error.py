@@ -16,8 +16,8 @@ from gfmd_cli.physics.discretisation_error import (
     LINE_GAP,
     MAX_AREA_EXPONENT,
     ExcessExponent,
+    IndenterTip,
     RoughnessScales,
-    Tip,
     estimate,
     excess_exponent,
     has_step,
@@ -27,7 +27,7 @@ from gfmd_cli.physics.discretisation_error import (
 from gfmd_cli.physics.elastomers import HalfSpace, Layer, Membrane, Power, Slab, Tabulated
 from gfmd_cli.physics.error_estimates import CONTINUUM_FACTOR, FLOOR, GridValues
 from gfmd_cli.physics.indenters import LineParabola, Parabola, Ridge, Wave
-from gfmd_cli.physics.observables import QUANTITIES, observe
+from gfmd_cli.physics.observables import MAIN_OBSERVABLES, observe
 from gfmd_cli.physics.scenes import build_scene
 from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.solvers.auto import Auto
@@ -78,7 +78,7 @@ def test_the_gap_is_its_own_best_guess():
     assert gap.error == gap.continuum_error >= levels[-1].u_g - 0.3
 
 
-@pytest.mark.parametrize("quantity", QUANTITIES)
+@pytest.mark.parametrize("quantity", MAIN_OBSERVABLES)
 @pytest.mark.parametrize("sign", [-1, 1])
 def test_a_jump_that_no_order_explains_widens_the_bar(quantity, sign):
     levels = sequence(1.0)
@@ -99,7 +99,7 @@ def test_the_order_of_the_levels_does_not_matter(rough):
 @pytest.mark.parametrize("n", [0.0, 1.0, 2.0])
 def test_a_finer_grid_has_smaller_bars(n):
     coarse, fine, finest = (estimate(sequence(n, (m,)), n, ROUGH) for m in (64, 1024, 2048))
-    for quantity in QUANTITIES:
+    for quantity in MAIN_OBSERVABLES:
         assert 0 < finest[quantity].error < fine[quantity].error < coarse[quantity].error
     ratio = fine["sigma_p"].error / finest["sigma_p"].error
     assert ratio == pytest.approx(2 ** min(2.0, 3 - n), rel=0.03)
@@ -195,7 +195,7 @@ def test_full_contact_on_a_coarse_grid_leaves_a_bar_where_finer_grids_have_gaps(
     coarse, above, fine, _ = rows(run(spec, tmp_path / "full.h5"))
     assert coarse["a_r"] == 1
     assert coarse["a_r_verdict"] == "regular"
-    for name in QUANTITIES:
+    for name in MAIN_OBSERVABLES:
         exact, value = (row[f"{name}_continuum"] for row in (fine, coarse))
         assert 0 < abs(value - exact) <= coarse[f"{name}_continuum_error"]
         assert above[f"{name}_verdict"] == "exact"
@@ -220,7 +220,7 @@ def test_full_contact_on_oblong_pixels_has_narrow_bars_that_hold(tmp_path, ratio
     }
     coarse, fine = rows(run(spec, tmp_path / "full.h5"))
     assert coarse["a_r"] == 1 > fine["a_r"]
-    for name in QUANTITIES:
+    for name in MAIN_OBSERVABLES:
         assert abs(coarse[name] - fine[name]) <= coarse[f"{name}_error"] < 0.1
 
 
@@ -287,7 +287,7 @@ def test_bars_hold_for_a_lattice_of_equal_bumps(tmp_path, width):
     found = rows(run(spec, tmp_path / "bumps.h5"))
     for load in spec["load"]["pressure"]:
         one, two, reference = (row for row in found if row["load_value"] == load)
-        for name in QUANTITIES:
+        for name in MAIN_OBSERVABLES:
             assert one[f"{name}_verdict"] == "unknown"
             error = two[f"{name}_continuum"] - reference[f"{name}_continuum"]
             assert 0 < abs(error) < two[f"{name}_continuum_error"]
@@ -306,12 +306,12 @@ def test_full_contact_is_not_exact_with_two_points_per_wave(tmp_path):
     assert two_points["a_r"] == 1
     assert abs(two_points["delta_sigma"] / fine["delta_sigma"] - 1) > 1e-4
     assert resolved["delta_sigma"] == pytest.approx(fine["delta_sigma"], rel=1e-12)
-    for name in QUANTITIES:
+    for name in MAIN_OBSERVABLES:
         verdicts = [row[f"{name}_verdict"] for row in (two_points, resolved, fine)]
         assert verdicts == ["unknown", "exact", "exact"]
 
 
-RIDGE, CONE = Tip(1.0, dimension=1), Tip(1.0)
+RIDGE, CONE = IndenterTip(1.0, dimension=1), IndenterTip(1.0)
 
 
 @pytest.mark.parametrize(
@@ -319,7 +319,7 @@ RIDGE, CONE = Tip(1.0, dimension=1), Tip(1.0)
     [
         (RIDGE, 1.0, "regular"), (RIDGE, 1.3, "slow"), (RIDGE, 1.5, "diverges"),
         (CONE, 1.75, "regular"), (CONE, 1.9, "slow"), (CONE, 2.0, "diverges"),
-        (Tip(2.0), 2.5, "regular"),
+        (IndenterTip(2.0), 2.5, "regular"),
     ],
 )  # fmt: skip
 def test_the_stress_of_a_sharp_tip_has_its_own_limit(tip, n, verdict):
@@ -364,13 +364,13 @@ def test_a_contact_of_one_point_is_refined_until_it_is_resolved():
 def test_a_change_that_is_small_by_accident_leaves_a_bar(n):
     """As the edge of a contact falls between the points of two grids alike."""
     levels = [GridValues(N, 0.9, 0.5, 0.01, 2.0) for N in (64, 128)]
-    smooth, sharp = (estimate(levels, n, tip=tip) for tip in (Tip(), RIDGE))
+    smooth, sharp = (estimate(levels, n, tip=tip) for tip in (IndenterTip(), RIDGE))
     assert smooth["sigma_p"].error > 0
     assert smooth["u_g"].error == pytest.approx(5 * 0.01 / (128 * 0.1) ** 2)
     assert sharp["u_g"].error == pytest.approx(20 * 0.01 / (128 * 0.1) ** 2)
 
 
-@pytest.mark.parametrize("tip", [Tip(2.0), Tip(1.0)], ids=str)
+@pytest.mark.parametrize("tip", [IndenterTip(2.0), IndenterTip(1.0)], ids=str)
 def test_the_bars_of_a_turned_cell_are_those_of_the_cell(tip):
     """A cell of 4:1 whose contact leaves a gap at its border, with L along either side."""
     levels = [GridValues(N, 0.9, 0.5, 0.01, 2.0, area=0.25) for N in (128, 256)]
@@ -398,7 +398,7 @@ def test_bars_of_line_contacts_hold(shape, n):
     held = {"sigma_p": [], "u_g": []}
     for p in pressures:
         levels = [measured[points, p] for points in (64, 128)]
-        values = estimate(levels, n, tip=Tip(shape.tip_exponent, dimension=1))
+        values = estimate(levels, n, tip=IndenterTip(shape.tip_exponent, dimension=1))
         for name, of_shape in held.items():
             estimated, exact = values[name], getattr(measured[2048, p], name)
             if estimated.verdict == "regular" and measured[2048, p].a_r < 1:
@@ -415,7 +415,7 @@ def test_bars_of_line_contacts_hold(shape, n):
 def test_the_area_of_a_kinked_profile_is_extrapolated_from_the_change_alone():
     levels = sequence(1.0, grids=(64, 128), line=2.0)
     kinked = RoughnessScales(waves=20.0, curvature=2e3, band_limited=False)
-    plane, line = (estimate(levels, 1.0, kinked, tip=Tip(2.0, d))["a_r"] for d in (2, 1))
+    plane, line = (estimate(levels, 1.0, kinked, tip=IndenterTip(2.0, d))["a_r"] for d in (2, 1))
     assert line.continuum == 2 * levels[-1].a_r - levels[-2].a_r
     assert line.continuum_error > plane.continuum_error
 
@@ -468,7 +468,7 @@ def test_an_irregular_surface_on_two_grids_has_bars_of_its_own(rough):
     """Wider than those of isotropic roughness, and at least as wide as the change."""
     levels = sequence(1.0)
     irregular, calm = (estimate(levels, 1.0, surface) for surface in (rough, ROUGH))
-    for name in QUANTITIES:
+    for name in MAIN_OBSERVABLES:
         change = getattr(levels[-1], name) - getattr(levels[-2], name)
         assert irregular[name].verdict == "regular"
         assert irregular[name].error > 0.8 * abs(change)
@@ -735,14 +735,14 @@ def test_equal_parts_of_a_line_profile_have_the_same_errors():
 def test_the_gaps_of_a_line_profile_have_an_error_where_grids_agree_by_chance(border):
     levels = [GridValues(N, 0.9, 0.5, 0.01, 4.0, border=border) for N in (64, 128)]
     line = RoughnessScales(waves=20.0, curvature=2e3, anisotropy=inf)
-    gap = estimate(levels, 1.0, line if border is None else None, tip=Tip(2.0, 1))["u_g"]
+    gap = estimate(levels, 1.0, line if border is None else None, tip=IndenterTip(2.0, 1))["u_g"]
     assert gap.error == pytest.approx(LINE_GAP * 0.01 / 6.4**2 / 2**0.5, rel=0.01)  # two gaps
 
 
 def test_a_profile_with_plateaus_does_not_follow_the_law_of_the_excess():
     levels = sequence(1.0, grids=(64, 128), line=2.0)
     flat = RoughnessScales(waves=20.0, curvature=2e3, anisotropy=inf, plateau=0.2)
-    area = estimate(levels, 1.0, flat, tip=Tip(2.0, 1))["a_r"]
+    area = estimate(levels, 1.0, flat, tip=IndenterTip(2.0, 1))["a_r"]
     assert area.continuum == pytest.approx(2 * levels[1].a_r - levels[0].a_r)
 
 
@@ -787,7 +787,7 @@ def test_a_rough_surface_on_nested_grids():
     levels = [measured(surface, Power(n=1), 10.0, points) for points in (32, 64, 512)]
     levels = [replace(level, u_g=level.u_g / scene.h_std) for level in levels]
     values = estimate(levels[:2], 1.0, roughness_scales(scene.shells, 1.0))
-    for quantity in QUANTITIES:
+    for quantity in MAIN_OBSERVABLES:
         value, exact = getattr(levels[1], quantity), getattr(levels[2], quantity)
         assert abs(value - exact) <= values[quantity].error
 
@@ -817,7 +817,7 @@ def test_a_soft_band_has_errors_only_on_grids_whose_short_waves_are_shorter(tmp_
         "accuracy": {"mean_gap": 0.05},
     }
     row = solve(spec).columns
-    assert {row[f"{name}_verdict"] for name in QUANTITIES} == {"unknown"}
+    assert {row[f"{name}_verdict"] for name in MAIN_OBSERVABLES} == {"unknown"}
     assert "or unknown" in row["warnings"]
 
 

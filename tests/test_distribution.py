@@ -126,7 +126,7 @@ def test_seeds_without_histogram_are_left_out(study):
     path = study("surface.seed=1", "output.histogram=false")
     (merged,) = distributions(compare(path))
     assert len(merged.seeds) == 1
-    shares = (merged.grids * WIDTH).sum(axis=1)
+    shares = (merged.grid_densities * WIDTH).sum(axis=1)
     np.testing.assert_allclose(shares, [row["a_r"] for row in merged.seeds[0]], rtol=1e-12)
 
 
@@ -294,7 +294,7 @@ def test_the_figure_in_the_continuum_shows_all_curves(study):
 def test_line_scenes_and_slabs_are_taken(study):
     path = study('surface={kind="wave"}', "elastomer={kind='slab', thickness=0.1}")
     (stresses,) = distributions(compare(path))
-    assert stresses.cells == [64, 128, 256]
+    assert stresses.point_counts == [64, 128, 256]
     assert power_laws(compare(path)).records
 
 

@@ -11,7 +11,7 @@ import pytest
 import xarray
 
 from gfmd_cli.analysis.export import _cell, _padded, as_dataset
-from gfmd_cli.study.columns import COLUMNS, CONTRACT, DETAILS, TASK
+from gfmd_cli.study.columns import COLUMNS, DETAIL_COLUMNS, MAIN_COLUMNS, TASK
 from gfmd_cli.study.reading import open_study, read_rows
 
 SPEC = """
@@ -72,7 +72,7 @@ def test_csv_has_the_columns_of_the_layout(output_of, study, tmp_path):
     text = (tmp_path / "s.csv").read_text()
     assert text == output_of("export", study)
     rows = list(csv.DictReader(io.StringIO(text)))
-    by_hand = [column.name for column in (*CONTRACT, *DETAILS)]
+    by_hand = [column.name for column in (*MAIN_COLUMNS, *DETAIL_COLUMNS)]
     assert list(rows[0])[: len(by_hand)] == by_hand
     assert {"cutoff", "hurst", "E_star"} < set(rows[0]) - set(by_hand)
     for row, stored in zip(rows, read_rows(study), strict=True):
@@ -82,7 +82,7 @@ def test_csv_has_the_columns_of_the_layout(output_of, study, tmp_path):
 
 def test_a_dataset_has_columns_distributions_scenes_and_curves(study):
     dataset, rows = as_dataset(study), read_rows(study)
-    assert {c.name for c in (*CONTRACT, *DETAILS)} <= {*dataset.variables}
+    assert {c.name for c in (*MAIN_COLUMNS, *DETAIL_COLUMNS)} <= {*dataset.variables}
     for column in (c for c in (TASK, *COLUMNS) if c.name in dataset.variables):
         variable = dataset[column.name]
         np.testing.assert_array_equal(variable.values, [row[column.name] for row in rows])

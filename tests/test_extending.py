@@ -132,8 +132,8 @@ class Descent(Solver):
             state.transforms += 2
             state.step += 1
 '''
-OBSERVABLE = """OBSERVABLES = (
-    Observable(
+OBSERVABLE = """OPTIONAL_OBSERVABLES = (
+    OptionalObservable(
         "lowest",
         Column("lowest_point", "depth of the lowest point of the elastomer / h_std"),
         lambda solved: float(-solved.u.min()),
@@ -178,7 +178,7 @@ def package(tmp_path_factory):
     (copy / "solvers/descent.py").write_text(DESCENT)
     imported = "from gfmd_cli.solvers.descent import Descent\n\n"
     extend(copy / "solvers/auto.py", imported, "AnySolver = Annotated[", "PolonskyKeer", "Descent")
-    replace(copy / "study/observables.py", "OBSERVABLES = (\n", OBSERVABLE)
+    replace(copy / "study/observables.py", "OPTIONAL_OBSERVABLES = (\n", OBSERVABLE)
     replace(copy / "spec/models.py", "    def on_request(", OPTION)
     return folder
 

@@ -155,7 +155,7 @@ def test_an_unknown_unit_in_a_header_is_refused(saved, header):
 @pytest.mark.parametrize("header", ["", "# version 3 (beta), at 12:30 pm\n", "X Y Z [1]\n"])
 def test_a_header_without_units_states_none(saved, header):
     read = read_topography(saved(header + points(np.arange(300), np.arange(12))))
-    assert (read.metres, read.spacing) == (False, pytest.approx((1.0, 1.0)))
+    assert (read.metric_sides, read.spacing) == (False, pytest.approx((1.0, 1.0)))
 
 
 @pytest.mark.parametrize("header", ["# profile of 20 um", "Unit: um\nx z", "x z\n# um"])
@@ -411,7 +411,7 @@ def test_an_esri_grid_has_sides_and_no_height_without_data(saved, stated, decima
     read = read_topography(saved(text, encoding))
     assert np.argwhere(read.missing).tolist() == [[3, 4]]
     assert read.heights[~read.missing] == pytest.approx(np.delete(HEIGHTS[::-1], 3 * 300 + 4))
-    assert (read.spacing, read.metres, read.periodic) == ((0.5, 0.5), False, False)
+    assert (read.spacing, read.metric_sides, read.periodic) == ((0.5, 0.5), False, False)
 
 
 @pytest.mark.parametrize(

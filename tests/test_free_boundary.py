@@ -205,7 +205,7 @@ def test_energy_never_rises():
 
     def watch(contact, state):
         stress = state.sigma
-        response = contact.free.displacement(stress, np.empty_like(stress))
+        response = contact.compliance.displacement(stress, np.empty_like(stress))
         energies.append(np.mean(stress * (0.5 * response - contact.height)))
 
     state = Dual().begin(contact, contact.grid.empty())
@@ -359,7 +359,7 @@ def test_stress_of_full_contact_is_that_of_the_mirrored_map():
     sigma = np.zeros((64, 64))
     sigma[:, :16] = 1.0
     solved = SolvedContact(wave, wave.height, sigma)
-    k = np.pi / contact.free.unit
+    k = np.pi / contact.compliance.unit
     s = k * x[:16]
     assert solved.full_contact_stress.deviation == pytest.approx(s.std(), rel=1e-10)
     slope = k * np.sin(np.pi * (np.arange(16) + 0.5) / 64)

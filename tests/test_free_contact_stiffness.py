@@ -10,7 +10,7 @@ from scipy.integrate import dblquad
 
 from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.physics.elastomers import HalfSpace
-from gfmd_cli.physics.free_contact import FreeContact, FreeElasticity
+from gfmd_cli.physics.free_contact import FreeCompliance, FreeContact
 from gfmd_cli.solvers.auto import Auto
 from gfmd_cli.solvers.contact_stiffness import contact_stiffness
 from gfmd_cli.solvers.nested_grids import solve_contact
@@ -41,8 +41,8 @@ def test_circular_contact_on_a_half_space_is_a_punch():
     """<t> L^2 = 2 E* a, and a displacement of (2 / pi) arcsin(a / r) beside the punch."""
     points, a, modulus = 128, 0.25, 3.0
     grid = Grid(points, 2, 1.0)
-    free = FreeElasticity(HalfSpace(E_star=modulus), grid, 1.0)
-    contact = FreeContact(grid, np.zeros(grid.shape), np.empty(0), 0.1, free=free)
+    compliance = FreeCompliance(HalfSpace(E_star=modulus), grid, 1.0)
+    contact = FreeContact(grid, np.zeros(grid.shape), np.empty(0), 0.1, compliance=compliance)
     middles = (np.arange(points) + 0.5) / points - 0.5
     touching = np.hypot(middles[:, None], middles) < a
     inside = np.pi * a**2 / 4  # of a quarter of the map, where the displacement is 1

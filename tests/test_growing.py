@@ -84,7 +84,7 @@ def times(path):
 
 
 WAYS = {
-    "a longer ladder": ("load.p_star={from=0.1, to=3.0, per_decade=2}",),
+    "a longer sequence": ("load.p_star={from=0.1, to=3.0, per_decade=2}",),
     "one more seed, in front": ("surface.seed=[2, 0, 1]",),
     "another elastomer": ("elastomer.n=[0, 1, 2]",),
     "other tasks than before": ("elastomer.n=3", "surface.seed=5"),

@@ -7,7 +7,7 @@ from test_elastomers import layered_stiffness
 
 from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.physics.elastomers import Layer, Slab
-from gfmd_cli.physics.free_contact import FreeContact, FreeElasticity
+from gfmd_cli.physics.free_contact import FreeCompliance, FreeContact
 from gfmd_cli.physics.scenes import reduce_scene
 from gfmd_cli.solvers.auto import Auto
 from gfmd_cli.solvers.nested_grids import solve_contact
@@ -66,8 +66,8 @@ def test_periodic_line_contact_is_that_of_a_dense_solution(back, thickness, p_st
 def test_free_line_contact_of_a_layer_is_that_of_a_dense_solution(back, thickness, pressure):
     """With the compliance that `test_free_compliance` compares with sums over all waves."""
     layer, h, grid = elastomer(back, thickness), rough_heights(), Grid(POINTS, 1, 1.0)
-    free = FreeElasticity(layer, grid, 1.0)
-    contact = FreeContact(grid, h - h.mean(), np.empty(0), pressure, free=free)
+    compliance = FreeCompliance(layer, grid, 1.0)
+    contact = FreeContact(grid, h - h.mean(), np.empty(0), pressure, compliance=compliance)
     solution = solve_contact(contact, Auto(tolerance=1e-11))
     kernel = layer.free_compliance(grid.shape, grid.spacings)
     compliance = kernel[np.abs(np.subtract.outer(np.arange(POINTS), np.arange(POINTS)))]

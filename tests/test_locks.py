@@ -18,7 +18,7 @@ import pytest
 
 from gfmd_cli.errors import Interrupted, SpaceError
 from gfmd_cli.files import locks
-from gfmd_cli.files.locks import Waits, locked
+from gfmd_cli.files.locks import WaitOptions, locked
 from gfmd_cli.study.reading import read_rows
 from gfmd_cli.study.store import Study
 
@@ -114,7 +114,7 @@ def test_a_long_wait_is_announced_once_with_its_owner_and_ends_with_the_run(
     Timer(0.5, stop.set).start()
     with (
         pytest.raises(Interrupted, match=f"in use by {owner}; run again"),
-        locked(lock, waits=Waits(stop)),
+        locked(lock, wait_options=WaitOptions(stop)),
     ):
         pass
     (message,) = caplog.messages
@@ -125,8 +125,8 @@ def test_a_long_wait_is_announced_once_with_its_owner_and_ends_with_the_run(
 def test_a_wait_ends_with_the_time_of_the_run(lock, kind, holder, monkeypatch):
     monkeypatch.setattr(locks, "LONG_SECONDS", 0.05)
     holder(kind, "exclusive")
-    waits = Waits(Event(), until=time.monotonic() + 0.3)
-    with pytest.raises(Interrupted, match="run again"), locked(lock, waits=waits):
+    wait_options = WaitOptions(Event(), until=time.monotonic() + 0.3)
+    with pytest.raises(Interrupted, match="run again"), locked(lock, wait_options=wait_options):
         pass
 
 
@@ -181,7 +181,10 @@ def test_a_wait_for_another_worker_of_the_run_is_not_announced(lock, holder, mon
     holder("kernel", "exclusive")
     stop = Event()
     Timer(0.3, stop.set).start()
-    with pytest.raises(Interrupted), locked(lock, waits=Waits(stop, run=os.getpid())):
+    with (
+        pytest.raises(Interrupted),
+        locked(lock, wait_options=WaitOptions(stop, run_pid=os.getpid())),
+    ):
         pass
     assert not caplog.messages
 
@@ -191,7 +194,7 @@ def test_a_wait_for_another_process_after_a_worker_of_the_run_is_announced(
 ):
     monkeypatch.setattr(locks, "LONG_SECONDS", -1.0)
     monkeypatch.setattr(locks, "_parent", {1: 42, 2: 7}.get)
-    waiting = locks._Wait(lock, Waits(run=42))
+    waiting = locks._Wait(lock, WaitOptions(run_pid=42))
     for pid in (1, 2, 2):
         waiting.pause(lambda pid=pid: locks._Owner("here", pid))
     (message,) = caplog.messages

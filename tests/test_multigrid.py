@@ -11,7 +11,7 @@ from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.solvers import direct_start
 from gfmd_cli.solvers import multigrid_transfer_kernels as kernels
 from gfmd_cli.solvers.auto import Auto
-from gfmd_cli.solvers.contact_state import PRESSED, TENSE
+from gfmd_cli.solvers.contact_state import PRESSED, TENSILE
 from gfmd_cli.solvers.multigrid import Multigrid, has_coarser_level, level_rows
 from gfmd_cli.solvers.nested_grids import solve_contact
 
@@ -197,10 +197,10 @@ def test_the_penalty_of_exactly_half_the_points_is_the_same():
 
 def test_points_under_tension_are_held_where_asked():
     state = pattern("disc")
-    state[10:20, 10:20] = TENSE
+    state[10:20, 10:20] = TENSILE
     force = np.random.default_rng(3).normal(size=state.shape)
     assert applied(3, state, force)[15, 15] != 0
-    assert not applied(3, state, force, threshold=TENSE)[state >= TENSE].any()
+    assert not applied(3, state, force, threshold=TENSILE)[state >= TENSILE].any()
 
 
 def steps_of_conjugate_gradients(n, state, length_y=1.0):

@@ -22,7 +22,7 @@ from gfmd_cli.spec.parse import read_spec
 from gfmd_cli.study.columns import COLUMNS as COLUMNS_OF_A_STUDY
 from gfmd_cli.study.columns import HISTOGRAMS, TASK_GROUPS
 from gfmd_cli.study.measure import optional_columns
-from gfmd_cli.study.observables import OBSERVABLES, SolvedContact
+from gfmd_cli.study.observables import OPTIONAL_OBSERVABLES, SolvedContact
 from gfmd_cli.study.reading import open_study, read_rows
 from gfmd_cli.study.run import RunOptions, run_study
 
@@ -169,7 +169,7 @@ def test_nothing_is_there_that_was_not_asked_for(output_of, tmp_path):
     with h5py.File(plain) as file:
         groups = set(file)
         assert not set(ON_REQUEST) & set(json.loads(file.attrs["spec"])["output"])
-    assert not {h.name for h in HISTOGRAMS if h.option != "histogram"} & groups
+    assert not {h.name for h in HISTOGRAMS if h.output_key != "histogram"} & groups
     assert (
         not {*(group.name for group in TASK_GROUPS[2:]), "pr_gap_zero", "gap", "patch_area"}
         & groups
@@ -269,9 +269,9 @@ def test_an_older_study_without_the_keys_goes_on(output_of, tmp_path):
 
 
 def test_every_observable_is_a_column_that_a_key_of_output_turns_on():
-    for observable in OBSERVABLES:
-        assert observable.option in ON_REQUEST
-        assert observable.option in OutputTable.model_fields
+    for observable in OPTIONAL_OBSERVABLES:
+        assert observable.output_key in ON_REQUEST
+        assert observable.output_key in OutputTable.model_fields
         assert observable.column in COLUMNS_OF_A_STUDY
 
 

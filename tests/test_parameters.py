@@ -18,9 +18,9 @@ from gfmd_cli.spec.check import MODELS, kinds_of
 from gfmd_cli.spec.models import SWEPT
 from gfmd_cli.study.columns import (
     COLUMNS,
-    CONTRACT,
-    DETAILS,
+    DETAIL_COLUMNS,
     HISTOGRAMS,
+    MAIN_COLUMNS,
     PARAMETERS,
     ROW_COLUMNS,
     SCENE,
@@ -184,7 +184,7 @@ def test_thickness_is_that_of_the_key():
 def test_csv_json_and_data_set_have_the_same_parameters(gfmd):
     assert gfmd("run", "spec.toml", "-o", "s.h5", "-q", "-j", "1").exit_code == 0
     rows = list(csv.DictReader(io.StringIO(gfmd("export", "s.h5").output)))
-    by_hand = [column.name for column in (*CONTRACT, *DETAILS)]
+    by_hand = [column.name for column in (*MAIN_COLUMNS, *DETAIL_COLUMNS)]
     assert list(rows[0])[: len(by_hand)] == by_hand
     names = list(rows[0])[len(by_hand) :]
     assert {"hurst", "rolloff", "cutoff", "E_star", "max_steps"} <= set(names)

@@ -10,9 +10,9 @@ from scipy import ndimage
 from gfmd_cli.physics.patches import (
     AREA_EDGES,
     area_distribution,
+    connected_regions,
     contact_patches,
     open_gap,
-    regions,
 )
 
 N = 12
@@ -93,7 +93,7 @@ def test_patches_join_across_edges_and_corners_of_the_cell():
     corner = np.zeros((N, N), dtype=bool)
     corner[0, 0] = corner[-1, -1] = True
     assert contact_patches(corner).sizes.tolist() == [2]
-    assert sorted(regions(corner, corners=False).sizes) == [1, 1]
+    assert sorted(connected_regions(corner, corners=False).sizes) == [1, 1]
 
 
 def test_on_a_line_scene_the_gap_is_parted_by_any_contact():
@@ -123,7 +123,7 @@ def test_random_masks_percolate_as_their_tiled_copies_do(corners):
     results = []
     for _ in range(400):
         mask = random.random((6, 6)) < random.uniform(0.3, 0.8)
-        directions = tuple(regions(mask, corners=corners).percolates.tolist())
+        directions = tuple(connected_regions(mask, corners=corners).percolates.tolist())
         assert directions == tiled_percolates(mask, corners)
         results.append(directions)
     assert len(set(results)) == 4  # along none, one, the other, both
@@ -146,11 +146,11 @@ def test_contact_percolates_where_the_gap_leaves_it_a_way(touching):
 @settings(max_examples=100)
 def test_regions_do_not_depend_on_where_the_cell_is_cut(mask, i, j):
     for corners in (False, True):
-        one = regions(mask, corners=corners)
-        other = regions(np.roll(mask, (i, j), axis=(0, 1)), corners=corners)
+        one = connected_regions(mask, corners=corners)
+        other = connected_regions(np.roll(mask, (i, j), axis=(0, 1)), corners=corners)
         assert sorted(one.sizes) == sorted(other.sizes)
         assert one.percolates.tolist() == other.percolates.tolist()
-        turned = regions(mask.T, corners=corners)
+        turned = connected_regions(mask.T, corners=corners)
         assert turned.percolates.tolist() == one.percolates.tolist()[::-1]
         assert one.sizes.sum() == mask.sum()
 

@@ -24,13 +24,13 @@ from gfmd_cli.physics.contact import PRESSURE_RANGE
 from gfmd_cli.physics.elastomers import Plate, Power, Slab, Tabulated, slab_factor
 from gfmd_cli.physics.error_bounds import error_bounds
 from gfmd_cli.physics.indenters import Parabola, PowerLawIndenter, Punch, Ridge
-from gfmd_cli.physics.observables import QUANTITIES, contact_pressure, observe
+from gfmd_cli.physics.observables import MAIN_OBSERVABLES, contact_pressure, observe
 from gfmd_cli.physics.persson import Persson, Shells
 from gfmd_cli.physics.scenes import build_scene
 from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.solvers.auto import Auto
 from gfmd_cli.solvers.nested_grids import solve_contact
-from gfmd_cli.spec.models import Ladder
+from gfmd_cli.spec.models import GeometricSequence
 from gfmd_cli.spec.parse import read_spec
 from gfmd_cli.study.context import SolveContext, Watcher, WorkerOptions
 from gfmd_cli.study.measure import error_columns
@@ -174,7 +174,7 @@ def check(tables):
     assert 0 <= observables.a_r <= 1
     columns = error_columns(solved)
     assert bool(columns) == ("accuracy" in tables)
-    for name in QUANTITIES if columns else ():
+    for name in MAIN_OBSERVABLES if columns else ():
         error, verdict = columns[f"{name}_error"], columns[f"{name}_verdict"]
         if verdict in ("regular", "exact"):
             assert isfinite(error)
@@ -275,7 +275,9 @@ def numbers(n, modulus=1.0, h_std=1.0, length=1.0):
         observables.energy,
     ]
     # NaN where a quantity has no continuum value
-    bars = [columns[f"{name}_{what}"] for name in QUANTITIES for what in ("error", "continuum")]
+    bars = [
+        columns[f"{name}_{what}"] for name in MAIN_OBSERVABLES for what in ("error", "continuum")
+    ]
     exact = [solved.solution.residual, columns["u_g_bound"], columns["sigma_p_bound"]]
     return np.array(values), np.array(bars), np.array(exact)
 
@@ -315,7 +317,7 @@ def test_units_of_all_kinds_at_once_drop_out(n, scale):
 # --- one contact in two descriptions --------------------------------------------------------------
 
 LAYER = {"kind": "layer", "thickness": 0.1, "poisson": 0.4}
-OF_QUANTITIES = [f"{name}_{what}" for name in QUANTITIES for what in ("continuum", "error")]
+OF_QUANTITIES = [f"{name}_{what}" for name in MAIN_OBSERVABLES for what in ("continuum", "error")]
 REDUCED = ["u_g", "a_r", "sigma_p", "energy", "stiffness", "perimeter", *OF_QUANTITIES]
 
 
@@ -468,13 +470,13 @@ def test_an_accuracy_of_the_smallest_number_is_not_reached():
     ("first", "last", "step"),
     [(-300, 300, 10), (-300, 308, 8), (-320, 305, 5), (-323, 308, 1), (-100, 200, 100)],
 )
-def test_a_ladder_spans_all_numbers(first, last, step):
+def test_a_sequence_spans_all_numbers(first, last, step):
     """One step more is often no number."""
     table = {"from": float(f"1e{first}"), "to": float(f"1e{last}"), "per_decade": 1 / step}
     with mp.workdps(40):
         decades = range(0, last - first + 1, step)
         exact = [float(mp.mpf(table["from"]) * mp.mpf(10) ** decade) for decade in decades]
-    values = Ladder.model_validate(table).values()
+    values = GeometricSequence.model_validate(table).values()
     assert values == pytest.approx(exact, rel=1e-12, abs=5e-324)
 
 

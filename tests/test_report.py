@@ -21,7 +21,7 @@ from specs import power_spec
 from gfmd_cli.analysis.compare import compare
 from gfmd_cli.analysis.diff import diff
 from gfmd_cli.analysis.table import Group, Table, TableColumn
-from gfmd_cli.analysis.wording import SPACE, quantity, span
+from gfmd_cli.analysis.wording import SPACE, span, with_unit
 from gfmd_cli.physics.persson import Shells
 from gfmd_cli.physics.surface_spectrum import spectrum
 from gfmd_cli.report import maps, rendering
@@ -291,12 +291,14 @@ n = 2
     data = read_report_data(path, "")
     numbers = {name: (value, note) for name, value, note in key_numbers(data)}
     assert numbers["Pressure"] == (
-        quantity(solid["pressure"], "Pa"), "p* = 0.3; in Pa: 1 of 2 contacts"
+        with_unit(solid["pressure"], "Pa"), "p* = 0.3; in Pa: 1 of 2 contacts"
     )  # fmt: skip
-    assert numbers["Unit of stress"][0] == quantity(solid["delta_sigma"], "Pa")
-    assert numbers["Stress deviation"][0] == quantity(solid["sigma_p"] * solid["delta_sigma"], "Pa")
+    assert numbers["Unit of stress"][0] == with_unit(solid["delta_sigma"], "Pa")
+    assert numbers["Stress deviation"][0] == with_unit(
+        solid["sigma_p"] * solid["delta_sigma"], "Pa"
+    )
     assert "contacts" not in numbers["Mean gap"][1]  # all are in m
-    assert quantity(reduced["pressure"], "Pa") not in headline(data)
+    assert with_unit(reduced["pressure"], "Pa") not in headline(data)
     cells = re.findall(r"<td[^>]*>([^<]*)</td>", report(path))
     for printed in (cells, invoke("analyze", path).output.split()):
         assert f"{solid['pressure']:.4g}" in printed
@@ -671,7 +673,7 @@ def test_colours_are_legible_on_both_papers():
 
 
 def test_values_are_told_with_units():
-    assert quantity(1.234e-9, "m") == f"1.23{SPACE}nm"
+    assert with_unit(1.234e-9, "m") == f"1.23{SPACE}nm"
     assert span([1e5, 1e8], "Pa") == f"100{SPACE}kPa to 100{SPACE}MPa"
     assert span([7e6, 1.2e8, np.nan], "Pa") == f"7 to 120{SPACE}MPa"
     assert span([0.0, 9.7e-7], "m") == f"0 to 0.97{SPACE}µm"

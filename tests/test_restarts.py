@@ -16,7 +16,7 @@ def steps_to_the_solution(contact, u, direction=None):
     solver = ProjectedCG(tolerance=1e-8)
     state = solver.begin_from(Start(contact, 0.0, u.copy(), contact.stress(u, np.empty_like(u))))
     if direction is not None:
-        change = contact.elasticity(direction, np.empty_like(u))
+        change = contact.apply_stiffness(direction, np.empty_like(u))
         state.direction[...], state.change[...] = direction, change
         state.length = state.moved = state.best_length = 1.0
         state.curvature = float(np.vdot(direction, change))

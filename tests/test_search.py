@@ -16,8 +16,8 @@ from gfmd_cli.errors import InputError, Interrupted
 from gfmd_cli.physics.scenes import build_scene
 from gfmd_cli.status import Status
 from gfmd_cli.study import load_search, run_task
+from gfmd_cli.study.history import Trial
 from gfmd_cli.study.load_search import _chords
-from gfmd_cli.study.notes import Trial
 from gfmd_cli.study.pressure_search import MAX_TRIALS, PressureSearch
 from gfmd_cli.study.reading import read_rows
 from gfmd_cli.study.tasks import plan
@@ -273,7 +273,7 @@ def test_the_face_of_a_punch_on_a_membrane_does_not_vanish_at_small_pressures(ro
 
 def test_a_first_trial_whose_contact_rounding_has_taken_is_not_the_nearest():
     """The area of a face, 0.1, is farther from 0.04 than none."""
-    search = a_search(first=1e-3, quantity="contact_area", slope=1.0, load=0.04)
+    search = a_search(first=1e-3, load_key="contact_area", slope=1.0, load=0.04)
     pressures = []
     while (pressure := search.next()) is not None:
         pressures.append(pressure)
@@ -497,30 +497,30 @@ curves = given(
     power=st.floats(0.05, 6.0),
     first=st.floats(-12.0, 12.0),
     steps=st.sampled_from([0, 12, 101, 10_001]),
-    quantity=st.sampled_from(["contact_area", "mean_gap"]),
+    load_key=st.sampled_from(["contact_area", "mean_gap"]),
 )
 SOME = settings(max_examples=300)
 
 
-@example(power=5.0, first=10.0, steps=0, quantity="contact_area")  # a start on the plateau
-@example(power=5.0, first=-10.0, steps=101, quantity="contact_area")
+@example(power=5.0, first=10.0, steps=0, load_key="contact_area")  # a start on the plateau
+@example(power=5.0, first=-10.0, steps=101, load_key="contact_area")
 @SOME
 @curves
-def test_every_monotone_curve_is_searched_to_its_end(power, first, steps, quantity):
-    check_search(power, first, steps, quantity)
+def test_every_monotone_curve_is_searched_to_its_end(power, first, steps, load_key):
+    check_search(power, first, steps, load_key)
 
 
 @pytest.mark.validation
 @settings(SOME, max_examples=2000)
 @curves
-def test_many_more_monotone_curves_are_searched_to_their_ends(power, first, steps, quantity):
-    check_search(power, first, steps, quantity)
+def test_many_more_monotone_curves_are_searched_to_their_ends(power, first, steps, load_key):
+    check_search(power, first, steps, load_key)
 
 
-def check_search(power, first, steps, quantity):
+def check_search(power, first, steps, load_key):
     """The value 0.1 is at p = 1; with steps it lies between two of them."""
-    search = a_search(math.exp(first), quantity, 1.0)
-    sign = 1 if quantity == "contact_area" else -1
+    search = a_search(math.exp(first), load_key, 1.0)
+    sign = 1 if load_key == "contact_area" else -1
 
     def value(p):
         exact = 1 / (1 + 9 * p ** (-sign * power))
@@ -531,16 +531,16 @@ def check_search(power, first, steps, quantity):
         search.add(Trial(64, p, value(p), 0.0))
         trials += 1
     assert 0 < trials < MAX_TRIALS
-    assert search.succeeded == (steps == 0 or quantity == "contact_area")  # gaps have no steps
+    assert search.succeeded == (steps == 0 or load_key == "contact_area")  # gaps have no steps
     count = min(range(1, steps + 1), key=lambda k: abs(math.log(k / steps / 0.1)), default=0)
     nearest = count / steps if steps else pytest.approx(0.1, rel=1e-5)
     assert search.nearest.value == nearest
 
 
-def a_search(first, quantity, slope, size=10**9, load=0.1):
+def a_search(first, load_key, slope, size=10**9, load=0.1):
     """A search of a value on a grid of `size` points."""
     task = SimpleNamespace(
-        quantity=quantity,
+        load_key=load_key,
         load=load,
         load_tolerance=1e-5,
         accuracy=None,

@@ -9,7 +9,7 @@ from gfmd_cli.analysis.curve_styles import seed_groups, with_styles
 from gfmd_cli.analysis.ensemble import Ensemble, ensembles
 from gfmd_cli.analysis.figures import PANELS, Series, _point, study_figures
 from gfmd_cli.analysis.plotting import styled
-from gfmd_cli.analysis.wording import quantity
+from gfmd_cli.analysis.wording import with_unit
 
 SPEC = """\
 [surface]
@@ -114,7 +114,7 @@ def test_the_pressure_of_a_mean_over_seeds_is_that_of_its_place_on_the_axis(tmp_
     (group,) = seed_groups(with_styles(compare(tmp_path / "gap.h5")))
     series = Series.of(AREA, group)
     mean = np.mean([row["pressure"] for row in rows])
-    assert series.details[0].startswith(f"pressure {quantity(mean, 'Pa')}\n")
+    assert series.details[0].startswith(f"pressure {with_unit(mean, 'Pa')}\n")
     assert mean == pytest.approx(series.x[0] * rows[0]["delta_sigma"], rel=1e-12)
 
 

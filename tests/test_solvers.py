@@ -26,7 +26,7 @@ from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.solvers.auto import Auto
 from gfmd_cli.solvers.contact_state import PRESSED
 from gfmd_cli.solvers.loop import State, is_certain
-from gfmd_cli.solvers.nested_grids import Resume, levels, solve_contact
+from gfmd_cli.solvers.nested_grids import Resume, nested_shapes, solve_contact
 from gfmd_cli.solvers.pcg import ProjectedCG
 from gfmd_cli.solvers.preconditioners import select
 from gfmd_cli.solvers.sort import Sort, is_flat
@@ -648,7 +648,7 @@ def test_grids_of_any_even_size_work(points, n):
 
 
 def squares(points):
-    return [shape[0] for shape in levels((points, points), (1.0, 1.0))]
+    return [shape[0] for shape in nested_shapes((points, points), (1.0, 1.0))]
 
 
 def test_grids_are_halved_down_to_the_coarsest():
@@ -677,7 +677,7 @@ def test_grids_are_halved_down_to_the_coarsest():
     ],
 )
 def test_oblong_grids_are_halved_along_the_shorter_side_of_their_pixels(shape, sides, chain):
-    assert levels(shape, sides) == chain
+    assert nested_shapes(shape, sides) == chain
 
 
 def test_the_watch_sees_every_grid_from_coarse_to_fine():

@@ -77,13 +77,13 @@ def test_several_tables_of_one_kind_are_a_sweep_too(read):
     assert [e.kind for e in spec.elastomer] == ["power", "power", "slab"]
 
 
-def ladder(read, **keys):
+def sequence(read, **keys):
     pairs = ", ".join(f"{key.strip('_')} = {value!r}" for key, value in keys.items())
     return read(("p_star = [0.1, 1.0]", f"pressure = {{ {pairs} }}"))
 
 
-def test_a_ladder_has_a_fixed_step_and_stays_below_its_end(read):
-    pressures = ladder(read, from_=1e-3, to=3.0, per_decade=4).load.values()
+def test_a_sequence_has_a_fixed_step_and_stays_below_its_end(read):
+    pressures = sequence(read, from_=1e-3, to=3.0, per_decade=4).load.values()
     expected = [1e-3 * 10 ** (i / 4) for i in range(14)]
     assert pressures == pytest.approx(expected, rel=1e-14, abs=0)
     assert pressures[-1] <= 3.0 < pressures[-1] * 10**0.25
@@ -91,14 +91,14 @@ def test_a_ladder_has_a_fixed_step_and_stays_below_its_end(read):
 
 @pytest.mark.parametrize(("first", "to"), [(1e-3, 1.0), (0.003, 0.3), (7e4, 7e7), (1e-300, 1e300)])
 @pytest.mark.parametrize("per_decade", [1, 3])
-def test_the_end_of_a_ladder_is_a_value_if_it_is_one_of_the_ladder(read, first, to, per_decade):
-    pressures = ladder(read, from_=first, to=to, per_decade=per_decade).load.values()
+def test_the_end_of_a_sequence_is_a_value_if_it_is_one_of_the_sequence(read, first, to, per_decade):
+    pressures = sequence(read, from_=first, to=to, per_decade=per_decade).load.values()
     assert pressures[-1] == pytest.approx(to, rel=1e-12)
     assert max(pressures) <= to * (1 + 1e-12)
 
 
 @pytest.mark.parametrize("per_decade", [1, 3, 1000])
-def test_a_ladder_of_reduced_pressures_may_end_at_the_largest_one(read, per_decade):
+def test_a_sequence_of_reduced_pressures_may_end_at_the_largest_one(read, per_decade):
     """Its last value, 1e-5 * 10^11, is above 1e6 by rounding."""
     ends = f"load.p_star={{from=1e-5, to=1e6, per_decade={per_decade}}}"
     assert read(overrides=(ends,)).load.values()[-1] == pytest.approx(1e6, rel=1e-12)
@@ -113,7 +113,7 @@ def test_a_ladder_of_reduced_pressures_may_end_at_the_largest_one(read, per_deca
 @settings(max_examples=200)
 @example(first=1.0, decades=1.0, more=1.0, per=1.9999999998840412)
 @example(first=100000.701171875, decades=1.9999999999999996, more=1.0, per=1.0)
-def test_a_longer_ladder_moves_no_task(first, decades, more, per):
+def test_a_longer_sequence_moves_no_task(first, decades, more, per):
     short, long = (
         {task.id for task in plan(read_tables(tomllib.loads(BASE) | {"load": {"pressure": ends}}))}
         for ends in (
@@ -124,8 +124,8 @@ def test_a_longer_ladder_moves_no_task(first, decades, more, per):
     assert short <= long
 
 
-def test_a_ladder_that_ends_below_its_second_value_has_one(read):
-    assert ladder(read, from_=0.1, to=0.2, per_decade=2).load.values() == [0.1]
+def test_a_sequence_that_ends_below_its_second_value_has_one(read):
+    assert sequence(read, from_=0.1, to=0.2, per_decade=2).load.values() == [0.1]
 
 
 def test_an_override_replaces_a_key(read):
@@ -422,7 +422,7 @@ def test_an_override_of_the_load_takes_the_place_of_what_the_file_says(tmp_path)
         "[grid]\npoints = 64\n[load]\npressure = 1e6\n"
     )
     load = read_spec(tmp_path / "spec.toml", ("load.p_star=0.5",))[0].load
-    assert (load.quantity, load.values()) == ("p_star", [0.5])
+    assert (load.key, load.values()) == ("p_star", [0.5])
 
 
 def test_other_combinations_of_the_same_values_are_another_sweep():

@@ -25,7 +25,7 @@ from gfmd_cli.study import measure, run_task
 from gfmd_cli.study import run as run_module
 from gfmd_cli.study.checkpoint import Checkpoint
 from gfmd_cli.study.columns import COLUMNS, LAYOUT
-from gfmd_cli.study.notes import Notes, Trial
+from gfmd_cli.study.history import TaskHistory, Trial
 from gfmd_cli.study.pointer import read_pointer
 from gfmd_cli.study.reading import open_study, read_rows
 from gfmd_cli.study.run import RunOptions, run_study
@@ -280,7 +280,7 @@ def test_a_missed_tolerance_is_said_and_kept(run):
 
 
 SOLVER = ProjectedCG()
-NOTES = Notes(trials=[Trial(16, 0.1, 0.2, 1.0)])
+HISTORY = TaskHistory(trials=[Trial(16, 0.1, 0.2, 1.0)])
 
 
 def test_checkpoints_come_back_as_they_were(tmp_path):
@@ -301,17 +301,17 @@ def test_checkpoints_come_back_as_they_were(tmp_path):
     with Checkpoint.exclusive(tmp_path / "c") as checkpoint:
         assert checkpoint.restore() is None
         assert checkpoint.load(grid, SOLVER) is None
-        checkpoint.save(contact, state, Notes())
+        checkpoint.save(contact, state, TaskHistory())
         older = state.u.copy()
         state.u += 1
         state.step = 8
-        checkpoint.save(contact, state, NOTES)
+        checkpoint.save(contact, state, HISTORY)
         with Checkpoint.exclusive(tmp_path / "c") as second:
             assert second.restore() is None
             assert second.load(grid, SOLVER) is None  # another process has it
     checkpoint = Checkpoint(tmp_path / "c")
     assert checkpoint.restore() is None
-    assert checkpoint.notes == NOTES
+    assert checkpoint.history == HISTORY
     resume = checkpoint.load(grid, SOLVER)
     assert (resume.shape, resume.moved) == ((16, 16), False)
     stored = resume.state
@@ -322,7 +322,7 @@ def test_checkpoints_come_back_as_they_were(tmp_path):
     checkpoint = Checkpoint(tmp_path / "c")
     assert "the one before it is resumed" in checkpoint.restore()
     np.testing.assert_array_equal(checkpoint.load(grid, SOLVER).state.u, older)
-    assert checkpoint.notes == Notes()
+    assert checkpoint.history == TaskHistory()
     flip(tmp_path / "c" / "pointer", 80)
     checkpoint = Checkpoint(tmp_path / "c")
     assert "set aside as .bad" in checkpoint.restore()

@@ -11,7 +11,7 @@ import pytest
 from specs import power_spec
 
 from gfmd_cli.cli.progress import Reporter
-from gfmd_cli.study.context import Progress
+from gfmd_cli.study.context import ProgressEvent
 from gfmd_cli.study.reading import read_rows
 
 SPEC = power_spec(
@@ -79,5 +79,5 @@ def test_a_bench_shows_its_progress_on_a_terminal(tmp_path):
 def test_a_line_of_progress_has_the_area_where_it_is_known(monkeypatch, capsys, a_r, words):
     """A process that shares a grid with others has a part of the contact only."""
     monkeypatch.setattr("gfmd_cli.cli.progress.LOG_EVERY", -1.0)
-    Reporter(quiet=False).show(Progress(0, "step", "task", 64, 7, 3e-5, a_r, tasks_left=1))
+    Reporter(quiet=False).show(ProgressEvent(0, "step", "task", 64, 7, 3e-5, a_r, tasks_left=1))
     assert capsys.readouterr().err.endswith(f"step 7 (64 points), residual {words}\n")

@@ -3,7 +3,7 @@ from types import SimpleNamespace
 import pytest
 
 from gfmd_cli.status import Status
-from gfmd_cli.study.context import Progress
+from gfmd_cli.study.context import ProgressEvent
 from gfmd_cli.study.tasks import plan
 from gfmd_cli.study.time_left import RemainingTime
 
@@ -43,7 +43,9 @@ def clock_of(time, *tasks, jobs=1):
 
 
 def word(index, event, residual=float("nan"), points=64, **others):
-    return Progress(index, event, "", points=points, residual=residual, size=points**2, **others)
+    return ProgressEvent(
+        index, event, "", points=points, residual=residual, size=points**2, **others
+    )
 
 
 def test_before_any_task_the_forecast_is_told(time):

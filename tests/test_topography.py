@@ -653,7 +653,7 @@ def test_the_distances_of_a_nanofocus_file_are_nanometres(tmp_path):
     (tmp_path / "h.nms").write_bytes(bytes(header) + levels.tobytes())
     read = read_topography(tmp_path / "h.nms")
     assert read.spacing == pytest.approx((250e-9, 312.5e-9))
-    assert (read.metres, read.periodic) == (True, False)
+    assert (read.metric_sides, read.periodic) == (True, False)
     assert read.heights == pytest.approx(1e-6 * (2 + levels / 65535), abs=1e-10)
 
 
@@ -901,7 +901,7 @@ def test_a_side_without_a_unit_is_in_that_of_the_heights(tmp_path):
     rows = (f"{x}e-8 {y}e-8 {(x * y) % 5}e-9" for y in range(16) for x in range(16))
     (tmp_path / "h.xyz").write_text("\n".join(rows))
     read = read_topography(tmp_path / "h.xyz")
-    assert not read.metres
+    assert not read.metric_sides
     assert read.spacing == pytest.approx((1e-8, 1e-8))
     plain = FileSurface(path=tmp_path / "h.xyz")
     assert plain.sides[1] == pytest.approx(16e-8)
@@ -920,7 +920,7 @@ def test_a_table_of_positions_has_the_units_of_its_header(tmp_path, header):
     read = read_topography(tmp_path / "h.xyz")
     assert read.heights == pytest.approx(1e-9 * heights)
     assert read.spacing == pytest.approx((0.25e-6, 0.5e-6))
-    assert (read.metres, read.metric_heights) == (True, True)
+    assert (read.metric_sides, read.metric_heights) == (True, True)
 
 
 def test_a_profile_has_the_units_of_its_header(tmp_path):

@@ -106,7 +106,7 @@ def test_a_paraboloid_on_a_membrane_has_no_deviation_at_all():
 def test_the_deviation_over_the_highest_points_is_that_of_a_sort():
     contact = rough(1)
     order = np.argsort(-contact.height.ravel())
-    stress = contact.elasticity(contact.height, contact.grid.empty()).ravel()[order]
+    stress = contact.apply_stiffness(contact.height, contact.grid.empty()).ravel()[order]
     curve = bearing(contact)
     assert np.all(np.diff(curve.area) > 0)
     for share, deviation in list(zip(curve.area, curve.deviation, strict=True))[::100]:

@@ -17,7 +17,7 @@ from gfmd_cli.solvers.loop import Solver, State
 from gfmd_cli.study import unfinished_work
 from gfmd_cli.study.checkpoint import Checkpoint
 from gfmd_cli.study.columns import LAYOUT as STUDY_LAYOUT
-from gfmd_cli.study.notes import Notes
+from gfmd_cli.study.history import TaskHistory
 from gfmd_cli.study.pointer import LAYOUT
 from gfmd_cli.study.unfinished_work import SUFFIX, read_record_entry
 
@@ -36,7 +36,7 @@ SOLVER = Solver(kind="plain")
 def checkpoint(tmp_path):
     """The folder of a checkpoint with one state."""
     with Checkpoint.exclusive(tmp_path / "c") as opened:
-        opened.save(Contact(), STATE, Notes())
+        opened.save(Contact(), STATE, TaskHistory())
     return tmp_path / "c"
 
 
@@ -58,12 +58,12 @@ FORGED = {
     "a residual that is text": lambda slot: slot["state"].update(residual="0"),
     "a state with tables": lambda slot: slot["state"].update(misses={"a": 1}),
     "a step below zero": lambda slot: slot["state"].update(step=-1),
-    "notes that are a list": lambda slot: slot.update(notes=[]),
-    "a grid without its values": lambda slot: slot["notes"]["grids"].append({"points": 8}),
-    "a trial without pressure": lambda slot: slot["notes"]["trials"].append(
-        {"points": 8, "pressure": 0.0, "value": 1.0, "work": 1.0}
+    "a history that is a list": lambda slot: slot.update(history=[]),
+    "a grid without its values": lambda slot: slot["history"]["grids"].append({"points": 8}),
+    "a trial without pressure": lambda slot: slot["history"]["trials"].append(
+        {"points": 8, "pressure": 0.0, "value": 1.0, "cost": 1.0}
     ),
-    "an unknown note": lambda slot: slot["notes"].update(more=1),
+    "an unknown key of the history": lambda slot: slot["history"].update(more=1),
     "another folder": part(file="../secret"),
     "an absolute path": part(file="/dev/zero"),
     "negative rows": part(rows=-16),
@@ -156,7 +156,7 @@ def test_a_slot_is_not_written_through_a_link(checkpoint):
     with Checkpoint.exclusive(checkpoint) as opened:
         opened.restore()
         with pytest.raises(SpaceError, match="cannot be written"):
-            opened.save(Contact(), STATE, Notes())
+            opened.save(Contact(), STATE, TaskHistory())
     assert target.read_text() == "precious"
 
 

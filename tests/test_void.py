@@ -109,7 +109,7 @@ def test_free_solution_satisfies_the_conditions_of_contact(surface, elastomer, p
     contact, unknown = scene.contact(p_star), np.isnan(holed_heights())
     solution = solve_contact(contact, Auto(tolerance=1e-9))
     assert solution.status == "converged"
-    kernel = elastomer.free_compliance(SHAPE, contact.grid.spacings) * contact.free.unit
+    kernel = elastomer.free_compliance(SHAPE, contact.grid.spacings) * contact.compliance.unit
     sizes = [2 * n for n in SHAPE]
     around = kernel[
         np.ix_(

@@ -14,7 +14,7 @@ from gfmd_cli.errors import InputError, typed
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.physics import einstein_solid
 from gfmd_cli.physics.gap_theories import CoarseGrained, FittedWeight
-from gfmd_cli.physics.observables import QUANTITIES
+from gfmd_cli.physics.observables import MAIN_OBSERVABLES
 from gfmd_cli.physics.persson import Persson, Shells
 from gfmd_cli.physics.surface_spectrum import Spectrum
 from gfmd_cli.physics.true_contact import contact_area
@@ -53,7 +53,7 @@ def best_of_all(rows: Sequence[Row], name: str) -> list[tuple[float, float]]:
 
 def with_best(row: Row) -> Row:
     """A row with the best value of each quantity, as `NAME_best`, and `NAME_best_error`."""
-    pairs = {name: best_of_all([row], name)[0] for name in QUANTITIES}
+    pairs = {name: best_of_all([row], name)[0] for name in MAIN_OBSERVABLES}
     values = {f"{name}_best": value for name, (value, _) in pairs.items()}
     return row | values | {f"{name}_best_error": error for name, (_, error) in pairs.items()}
 
@@ -165,14 +165,14 @@ class Curve:
     def records(self) -> list[Row]:
         """The rows with best values and with theory at each pressure, NaN where it is unknown."""
         p_star = self.column("p_star")
-        columns = {f"{name}_persson": getattr(self.prediction, name) for name in QUANTITIES}
+        columns = {f"{name}_persson": getattr(self.prediction, name) for name in MAIN_OBSERVABLES}
         columns["p_star_persson_at_u_g"] = self.pressure_at_gap(self.column("u_g"))
         for name, key in VARIANTS.items():
             deviation = self.column(name) if self.has_theory else np.full_like(p_star, np.nan)
             columns[key] = contact_area(deviation, p_star)
         if self.n == 0 and self.has_theory:
             exact = einstein_prediction(p_star)
-            columns |= {f"{name}_einstein": getattr(exact, name) for name in QUANTITIES}
+            columns |= {f"{name}_einstein": getattr(exact, name) for name in MAIN_OBSERVABLES}
         return [
             with_best(row) | {name: float(values[i]) for name, values in columns.items()}
             for i, row in enumerate(self.rows)

@@ -12,7 +12,7 @@ from gfmd_cli.analysis.compare import load_of, with_solvers
 from gfmd_cli.analysis.selection import grouped
 from gfmd_cli.analysis.table import BLANK, Record, Table, TableColumn, groups_of, known, plain
 from gfmd_cli.analysis.wording import contact_and_boundary, points_text
-from gfmd_cli.physics.observables import QUANTITIES
+from gfmd_cli.physics.observables import MAIN_OBSERVABLES
 from gfmd_cli.spec.differences import differences
 from gfmd_cli.spec.models import LOADS, load_text
 from gfmd_cli.study.column import Row
@@ -56,7 +56,7 @@ class Pair:
 
     def values(self, name: str, suffix: str = "") -> tuple[float, float]:
         """A quantity in both studies, in the unit in which it is compared; "_error": its error."""
-        scale = QUANTITIES[name].scale if self.physical else ""
+        scale = MAIN_OBSERVABLES[name].unit_column if self.physical else ""
         a, b = (
             float(row[name + suffix] * (row[scale] if scale else 1.0))
             for row in (self.one, self.other)
@@ -78,9 +78,9 @@ class Pair:
         record = {key: self.one[key] for key in CONTACT}
         for key in OF_EACH:
             record |= {f"{key}_a": self.one[key], f"{key}_b": self.other[key]}
-        for name, quantity in QUANTITIES.items():
+        for name, observable in MAIN_OBSERVABLES.items():
             a, b = self.values(name)
-            unit = (self.physical and quantity.si) or "1"
+            unit = (self.physical and observable.si_unit) or "1"
             record |= {f"{name}_a": a, f"{name}_b": b, f"{name}_unit": unit}
             relative, in_errors = self.deviation(name)
             record |= {f"{name}_relative": relative, f"{name}_in_errors": in_errors}
@@ -103,7 +103,8 @@ class Difference:
     def largest(self) -> dict[str, float]:
         """The largest relative difference of each quantity; zero where nothing can be compared."""
         differing = {
-            name: [abs(pair.deviation(name).relative) for pair in self.pairs] for name in QUANTITIES
+            name: [abs(pair.deviation(name).relative) for pair in self.pairs]
+            for name in MAIN_OBSERVABLES
         }
         return {name: max(filter(known, values), default=0.0) for name, values in differing.items()}
 
@@ -189,7 +190,7 @@ def _deviation(record: Record, name: str) -> str:
 DIFFERENCES = (
     TableColumn("load", _load),
     TableColumn("points", _grids),
-    *(TableColumn(name, partial(_deviation, name=name)) for name in QUANTITIES),
+    *(TableColumn(name, partial(_deviation, name=name)) for name in MAIN_OBSERVABLES),
 )
 
 

@@ -25,7 +25,7 @@ from gfmd_cli.analysis.wording import contact_and_boundary
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.physics.observables import LOGARITHMIC_EDGES, estimated_patches, geometric_middles
 from gfmd_cli.study.column import Row
-from gfmd_cli.study.columns import BINS, PR_LOGARITHMIC
+from gfmd_cli.study.columns import HISTOGRAMS_BY_NAME, PR_LOGARITHMIC
 
 MAX_CHANGE = 0.35  # of ln Pr between grids; a bin with more is not resolved; a choice
 NEIGHBOURS = 2  # bins to each side in the mean of the change between grids; a choice
@@ -41,7 +41,7 @@ def has_histogram(row: Row, name: str = PR_LOGARITHMIC) -> bool:
 
 def bin_counts(row: Row, name: str = PR_LOGARITHMIC) -> Field:
     """Grid points in each bin of Pr(sigma): density times width times the points of the cell."""
-    return row[name] * np.diff(BINS[name].edges) * row["points"] * row["points_y"]
+    return row[name] * np.diff(HISTOGRAMS_BY_NAME[name].edges) * row["points"] * row["points_y"]
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ class Extrapolated:
     Counts on grids of one surface scatter less where the grids resolve the stress."""
 
 
-def extrapolate(counts: Field, cells: Sequence[int]) -> Extrapolated:
+def extrapolate(counts: Field, point_counts: Sequence[int]) -> Extrapolated:
     """Richardson extrapolation of ln Pr on grids N/2 and N to zero spacing, at first order.
 
     Bins that change by more than MAX_CHANGE are not resolved. A third grid tells where the change
@@ -69,11 +69,11 @@ def extrapolate(counts: Field, cells: Sequence[int]) -> Extrapolated:
     ----------
     counts : points in the bins of `LOGARITHMIC_EDGES`, shape (grids, bins), each grid with twice
         the points of the one before
-    cells : points counted on each grid, times the seeds if these are added
+    point_counts : points counted on each grid, times the seeds if these are added
     """
     widths = np.diff(LOGARITHMIC_EDGES)
     with np.errstate(divide="ignore", invalid="ignore"):
-        log = np.log(counts / (widths * np.asarray(cells, dtype=np.float64)[:, None]))
+        log = np.log(counts / (widths * np.asarray(point_counts, dtype=np.float64)[:, None]))
         noise = 1 / counts
         steps = [
             _averaged(fine - coarse, a + b)
@@ -142,20 +142,20 @@ class StressDistribution:
         return of_study(self.curve.study, title)
 
     @cached_property
-    def cells(self) -> list[int]:
+    def point_counts(self) -> list[int]:
         """Points of the cells of all seeds, on each grid."""
         return [len(self.seeds) * row["points"] * row["points_y"] for row in self.seeds[0]]
 
     @cached_property
-    def grids(self) -> Field:
+    def grid_densities(self) -> Field:
         """Density on each grid, mean over the seeds, shape (grids, bins)."""
         widths = np.diff(LOGARITHMIC_EDGES)
-        return self.counts.sum(axis=0) / (np.array(self.cells)[:, None] * widths)
+        return self.counts.sum(axis=0) / (np.array(self.point_counts)[:, None] * widths)
 
     @cached_property
     def extrapolated(self) -> Extrapolated:
         """In the continuum, the points of all seeds together."""
-        extrapolated = extrapolate(self.counts.sum(axis=0), self.cells)
+        extrapolated = extrapolate(self.counts.sum(axis=0), self.point_counts)
         known = self.depth > MIN_DEPTH
         return replace(extrapolated, log_density=np.where(known, extrapolated.log_density, np.nan))
 
@@ -169,7 +169,7 @@ class StressDistribution:
         """
         counts = self.counts[:, -1].sum(axis=0)
         line = float(np.mean([rows[-1]["perimeter"] for rows in self.seeds]))
-        line *= self.cells[-1] / self.points[-1]
+        line *= self.point_counts[-1] / self.points[-1]
         if self.finest["dimension"] == 2:
             line *= np.pi / 4
         below = np.cumsum(counts) - 0.5 * counts

@@ -30,7 +30,7 @@ from gfmd_cli.analysis.tables import curve_title
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.status import worst
 from gfmd_cli.study.column import Row
-from gfmd_cli.study.columns import BINS, PR_LINEAR, PR_LOGARITHMIC
+from gfmd_cli.study.columns import HISTOGRAMS_BY_NAME, PR_LINEAR, PR_LOGARITHMIC
 
 TYPICAL_AREA = 0.1  # relative contact area of the paper's Fig. 7
 NEAR = 1.5  # pressures that differ by a smaller factor are shown side by side
@@ -123,7 +123,9 @@ def mean_density(item: StyledCurve, rows: list[Row], name: str) -> Density:
     row = rows[0] | {"status": worst(row["status"] for row in rows)}
     row |= {key: np.mean([row[key] for row in rows], axis=0) for key in (name, "p_star")}
     frequent = bin_counts(row, name) > MIN_COUNT - 0.5
-    return Density(item, row, len(rows), BINS[name].middles()[frequent], row[name][frequent])
+    return Density(
+        item, row, len(rows), HISTOGRAMS_BY_NAME[name].middles()[frequent], row[name][frequent]
+    )
 
 
 def distribution_figures(items: list[StyledCurve]) -> dict[str, ColumnFigure | None]:
@@ -212,8 +214,8 @@ def _draw(
     plot: ColumnFigure, stress: StressDistribution, style: CurveStyle
 ) -> tuple[float, float, float, float]:
     """Symbols with error bars over the faint lines of the grids; return the span of the symbols."""
-    sigma = BINS[PR_LOGARITHMIC].middles()
-    for density in np.where(stress.grids > 0, stress.grids, np.nan):
+    sigma = HISTOGRAMS_BY_NAME[PR_LOGARITHMIC].middles()
+    for density in np.where(stress.grid_densities > 0, stress.grid_densities, np.nan):
         faint = {"color": style.colour, "lw": 0.4, "alpha": 0.45}
         plot.unnamed_line((style.label,), sigma, density, **faint)
     known = np.isfinite(stress.density) & np.isfinite(stress.error)

@@ -69,14 +69,14 @@ class Line:
     """Standard error of the slope."""
     shared: float
     """The part of it that is shared between the bins."""
-    level: float
+    intercept: float
     """ln Pr at sigma = 1 without the correction."""
 
 
 def straight_line(
     x: Field, y: Field, own: Field, shared: Field, correction: Field | None = None
 ) -> Line:
-    """Least squares of y = level + slope x (+ b correction).
+    """Least squares of y = intercept + slope x (+ b correction).
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ def straight_line(
         slope=float(coefficients[1]),
         error=float(errors[1]),
         shared=float(abs(levers[1] @ shared)),
-        level=float(coefficients[0] - coefficients[1] * centre),
+        intercept=float(coefficients[0] - coefficients[1] * centre),
     )
 
 
@@ -148,7 +148,7 @@ def fit_power_law(stress: StressDistribution, law: str) -> PowerLaw | None:
         highest=float(edges[base.max() + 1]),
         exponent=line.slope,
         error=float(np.hypot(line.error, 0.5 * (max(slopes) - min(slopes)))),
-        prefactor=float(np.exp(line.level - _bending(line.slope))),
+        prefactor=float(np.exp(line.intercept - _bending(line.slope))),
         limit=limit,
         limit_error=limit_error,
         theory=float(theory),

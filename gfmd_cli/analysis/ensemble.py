@@ -12,7 +12,7 @@ from scipy.special import stdtrit
 from gfmd_cli.analysis.compare import Comparison, best_of_all, load_of, of_study
 from gfmd_cli.analysis.selection import grouped
 from gfmd_cli.analysis.wording import contact_and_boundary, contact_title, grid_size
-from gfmd_cli.physics.observables import QUANTITIES
+from gfmd_cli.physics.observables import MAIN_OBSERVABLES
 from gfmd_cli.spec.models import LOADS
 from gfmd_cli.study.column import Row
 from gfmd_cli.study.columns import PARAMETERS
@@ -71,7 +71,7 @@ class Ensemble:
         errors = [row["p_star_error"] for row in self.rows]
         pressures = [row["p_star"] for row in self.rows]
         spread = spread_of(pressures, errors, residual_of(self.rows))
-        if LOADS[self.rows[0]["load"]].searched not in QUANTITIES:  # the load has no errors
+        if LOADS[self.rows[0]["load"]].searched not in MAIN_OBSERVABLES:  # the load has no errors
             return spread
         has_unknown = any(map(isnan, errors)) and any(map(_has_errors, self.rows))
         return replace(spread, half_width=nan) if has_unknown else spread
@@ -83,7 +83,7 @@ class Ensemble:
         """
         failed = sum(not row["status"].is_converged for row in self.rows)
         record: dict[str, Any] = {"seeds": len(self.rows), "seeds_not_converged": failed}
-        spreads = {name: self.spread(name) for name in QUANTITIES}
+        spreads = {name: self.spread(name) for name in MAIN_OBSERVABLES}
         if LOADS[self.rows[0]["load"]].searched:
             spreads["p_star"] = self.pressure_spread()
         for name, spread in spreads.items():
@@ -138,7 +138,7 @@ def by_load(rows: Iterable[Row]) -> list[list[Row]]:
 
 def _has_errors(row: Row) -> bool:
     """Whether a row is one with [accuracy]."""
-    return any(row.get(f"{name}_verdict") for name in QUANTITIES)
+    return any(row.get(f"{name}_verdict") for name in MAIN_OBSERVABLES)
 
 
 def ensembles(comparison: Comparison) -> list[Ensemble]:

@@ -19,15 +19,15 @@ from gfmd_cli.analysis.table import known, plain
 from gfmd_cli.errors import INSTALL, InputError
 from gfmd_cli.files.atomic import new_file, target_of
 from gfmd_cli.grid.arrays import Field
-from gfmd_cli.physics.observables import QUANTITIES
+from gfmd_cli.physics.observables import MAIN_OBSERVABLES
 from gfmd_cli.study import columns as layout
 from gfmd_cli.study.column import Column, Row
 from gfmd_cli.study.reading import StudyFile, open_study, read_rows, solved_rows
 
 FORMULA = ("=", "+", "-", "@", "\t", "\r")
 """Characters with which a formula of a spreadsheet begins."""
-THEORY_COLUMNS = (*(f"{name}_persson" for name in QUANTITIES), "p_star_persson_at_u_g")
-EINSTEIN_COLUMNS = tuple(f"{name}_einstein" for name in QUANTITIES)
+THEORY_COLUMNS = (*(f"{name}_persson" for name in MAIN_OBSERVABLES), "p_star_persson_at_u_g")
+EINSTEIN_COLUMNS = tuple(f"{name}_einstein" for name in MAIN_OBSERVABLES)
 _PARAMETER_NAMES = (each.column.name for each in layout.PARAMETERS)
 COORDINATES = tuple(dict.fromkeys(("surface", "elastomer", *_PARAMETER_NAMES, "p_star")))
 """Columns that are coordinates of the data set: labels, parameters and the reduced pressure."""
@@ -57,7 +57,7 @@ def column_names(rows: list[Row]) -> list[str]:
         for column in layout.PARAMETER_COLUMNS
         if not all(column.is_blank(row[column.name]) for row in rows)
     )
-    return [column.name for column in (*layout.CONTRACT, *layout.DETAILS, *parameters)]
+    return [column.name for column in (*layout.MAIN_COLUMNS, *layout.DETAIL_COLUMNS, *parameters)]
 
 
 def as_records(comparison: Comparison) -> list[dict[str, Any]]:

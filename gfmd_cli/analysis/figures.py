@@ -16,7 +16,7 @@ from gfmd_cli.analysis.curve_styles import CurveStyle, StyledCurve, seed_groups,
 from gfmd_cli.analysis.distribution_figure import continuum_figure, distribution_figures
 from gfmd_cli.analysis.ensemble import by_load, residual_of, spread_of
 from gfmd_cli.analysis.plotting import DASHED, THEORY, ColumnFigure, styled, write_all
-from gfmd_cli.analysis.wording import contact_title, grid_size, in_si, quantity
+from gfmd_cli.analysis.wording import contact_title, grid_size, in_si, with_unit
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.status import Status, worst
 from gfmd_cli.study.column import Row
@@ -129,7 +129,7 @@ def _details(rows: list[Row]) -> str:
     first = rows[0]
     pressure = float(np.mean([row["pressure"] for row in rows]))
     lines = [
-        *([f"pressure {quantity(pressure, 'Pa')}"] if in_si(first, "Pa") else []),
+        *([f"pressure {with_unit(pressure, 'Pa')}"] if in_si(first, "Pa") else []),
         contact_title(first, of_seeds=len(rows) > 1),
         f"{grid_size(rows)}, solver {first['solver']}",
     ]

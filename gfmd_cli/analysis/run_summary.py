@@ -18,7 +18,7 @@ from gfmd_cli.analysis.tables import (
     warnings_in,
 )
 from gfmd_cli.analysis.wording import contact_and_boundary, contact_title, grid_size, shown
-from gfmd_cli.physics.observables import QUANTITIES
+from gfmd_cli.physics.observables import MAIN_OBSERVABLES
 from gfmd_cli.study.measure import planned
 from gfmd_cli.study.reading import solved_rows, tell_files_apart
 from gfmd_cli.study.result import Outcome
@@ -38,7 +38,7 @@ TASKS = (
 RUN = (
     replace(P_STAR, error="p_star_error"),
     PRESSURE,
-    *(best_value(name, name, ".5g") for name in QUANTITIES),
+    *(best_value(name, name, ".5g") for name in MAIN_OBSERVABLES),
     TableColumn("gap", "mean_gap", ".3g", "m"),
     RESIDUAL,
     STATUS,

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from gfmd_cli.analysis.table import Group, Table, TableColumn, plain, plus_minus, records_of
-from gfmd_cli.maps.height_map import extent
+from gfmd_cli.maps.height_map import shape_text
 from gfmd_cli.maps.map_warnings import unresolved
 from gfmd_cli.maps.roughness_parameters import MAP_NAMES, PROFILE_NAMES, roughness_parameters
 from gfmd_cli.physics.contact import Scene
@@ -150,7 +150,7 @@ def summary_text(summary: SurfaceSummary) -> str:
         for name, value in summary.parameters.items()
     ]
     lines = [
-        f"L = {sides}{metres} on {extent(record['points'][::-1])} points",
+        f"L = {sides}{metres} on {shape_text(record['points'][::-1])} points",
         ", ".join(words[:5]),
         ", ".join(words[5:]),
         f"spectral: rms height {measured.height:.6g}{metres}, "

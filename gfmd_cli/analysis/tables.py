@@ -30,8 +30,8 @@ from gfmd_cli.analysis.table import (
 )
 from gfmd_cli.analysis.wording import SPACE, contact_title, grid_size, in_si, shown
 from gfmd_cli.grid.arrays import Field
-from gfmd_cli.physics.observables import QUANTITIES
-from gfmd_cli.study.observables import OBSERVABLES, Observable
+from gfmd_cli.physics.observables import MAIN_OBSERVABLES
+from gfmd_cli.study.observables import OPTIONAL_OBSERVABLES, OptionalObservable
 from gfmd_cli.study.plausibility import SEPARATOR
 from gfmd_cli.units import count
 
@@ -55,12 +55,14 @@ THEORIES = {"persson": "Persson", "einstein": "closed form"}
 
 def _beside_theory(name: str, theory: str = "persson", *, best: bool = False) -> list[TableColumn]:
     """A quantity on the grid, or its best value in SI units too, with prediction and ratio."""
-    (symbol, unit, si), heading = QUANTITIES[name], THEORIES[theory]
+    (symbol, unit_column, si_unit), heading = MAIN_OBSERVABLES[name], THEORIES[theory]
     value, predicted = f"{name}_best" if best else name, f"{name}_{theory}"
     columns = [TableColumn(heading, predicted, optional=True)]
-    if best and unit:
-        columns.insert(0, TableColumn(name, product(value, unit), unit=si))
-        columns.append(TableColumn(heading, product(predicted, unit), unit=si, optional=True))
+    if best and unit_column:
+        columns.insert(0, TableColumn(name, product(value, unit_column), unit=si_unit))
+        columns.append(
+            TableColumn(heading, product(predicted, unit_column), unit=si_unit, optional=True)
+        )
     return [
         best_value(name, symbol) if best else TableColumn(name, name),
         *columns,
@@ -81,7 +83,7 @@ def best_value(name: str, heading: str, number_format: str = TableColumn.format)
 
 def _continuum(name: str) -> TableColumn:
     return TableColumn(
-        QUANTITIES[name].heading,
+        MAIN_OBSERVABLES[name].heading,
         lambda record: record[f"{name}_continuum"] if in_continuum(record, name) else None,
         error=f"{name}_continuum_error",
         otherwise=f"{name}_verdict",
@@ -91,25 +93,34 @@ def _continuum(name: str) -> TableColumn:
 COMPARISON = (
     P_STAR,
     PRESSURE,
-    *(column for name in QUANTITIES for column in _beside_theory(name)),
+    *(column for name in MAIN_OBSERVABLES for column in _beside_theory(name)),
     TableColumn("p ratio", ratio("p_star_persson_at_u_g", "p_star"), optional=True),
     STATUS,
 )
-EINSTEIN = (P_STAR, PRESSURE, *(c for name in QUANTITIES for c in _beside_theory(name, "einstein")))
+EINSTEIN = (
+    P_STAR,
+    PRESSURE,
+    *(c for name in MAIN_OBSERVABLES for c in _beside_theory(name, "einstein")),
+)
 ON_GRIDS = "Values on the grid, not extrapolated."
 EINSTEIN_CAPTION = f"Comparison with the closed form for n = 0 and Gaussian heights. {ON_GRIDS}"
-CONTINUUM = (replace(P_STAR, error="p_star_error"), PRESSURE, POINTS, *map(_continuum, QUANTITIES))
+CONTINUUM = (
+    replace(P_STAR, error="p_star_error"),
+    PRESSURE,
+    POINTS,
+    *map(_continuum, MAIN_OBSERVABLES),
+)
 SEEDS = (
     replace(P_STAR, error="p_star_confidence"),
     PRESSURE,
     *(
-        TableColumn(quantity.heading, f"{name}_mean", error=f"{name}_confidence")
-        for name, quantity in QUANTITIES.items()
+        TableColumn(observable.heading, f"{name}_mean", error=f"{name}_confidence")
+        for name, observable in MAIN_OBSERVABLES.items()
     ),
     TableColumn("not converged", "not_converged", optional=True),
 )
 BEST_VALUES = {
-    name: (P_STAR, PRESSURE, *_beside_theory(name, best=True), STATUS) for name in QUANTITIES
+    name: (P_STAR, PRESSURE, *_beside_theory(name, best=True), STATUS) for name in MAIN_OBSERVABLES
 }
 """Columns by quantity: with continuum values where they are known, else with values on the grid."""
 TRUE_CONTACT = (
@@ -148,7 +159,7 @@ POWER_LAWS_CAPTION = (
 )
 
 
-def _columns_of(observable: Observable) -> list[TableColumn]:
+def _columns_of(observable: OptionalObservable) -> list[TableColumn]:
     """An observable in reduced and in SI units; the columns that no task has are left out."""
     heading, name, unit = observable.heading, observable.column.name, observable.unit
     if unit is not None and observable.line_unit is not None:
@@ -164,7 +175,9 @@ def _columns_of(observable: Observable) -> list[TableColumn]:
         return [TableColumn(heading, name, number_format, optional=True)]
     return [
         TableColumn(f"{heading}\n/ {unit.symbol}", name, number_format, optional=True),
-        TableColumn(f"{heading}\n", lambda r: r[name] * unit.value(r), unit=unit.si, optional=True),
+        TableColumn(
+            f"{heading}\n", lambda r: r[name] * unit.value(r), unit=unit.si_unit, optional=True
+        ),
     ]
 
 
@@ -173,9 +186,9 @@ def _of_dimension(dimension: int, value: Value) -> Callable[[Record], Any]:
     return lambda record: value_in(record, value) if record["dimension"] == dimension else None
 
 
-IN_TABLE = tuple(observable for observable in OBSERVABLES if observable.heading)
+IN_TABLE = tuple(observable for observable in OPTIONAL_OBSERVABLES if observable.heading)
 """The observables that [output] turns on, without those that have a table of their own."""
-OPTIONAL_OBSERVABLES = (
+OPTIONAL_COLUMNS = (
     P_STAR,
     PRESSURE,
     AREA,
@@ -243,7 +256,9 @@ def over_pressure(
 def continuum_table(curves: TitledCurves) -> Table:
     """Continuum values with their errors, or the reason why there is none."""
     caption = "Continuum values with their estimated errors, or the reason why there is none."
-    return over_pressure(CONTINUUM, caption, curves, [f"{name}_verdict" for name in QUANTITIES])
+    return over_pressure(
+        CONTINUUM, caption, curves, [f"{name}_verdict" for name in MAIN_OBSERVABLES]
+    )
 
 
 def true_contact_table(curves: TitledCurves) -> Table:
@@ -257,7 +272,7 @@ def true_contact_table(curves: TitledCurves) -> Table:
 def observables_table(curves: TitledCurves) -> Table:
     """The observables that keys of [output] have turned on, with their meaning."""
     columns = [observable.column for observable in IN_TABLE]
-    table = over_pressure(OPTIONAL_OBSERVABLES, "", curves, [column.name for column in columns])
+    table = over_pressure(OPTIONAL_COLUMNS, "", curves, [column.name for column in columns])
     meanings = [
         column.meaning[:1].upper() + column.meaning[1:]
         for column in columns
@@ -289,7 +304,7 @@ def seeds_table(comparison: Comparison) -> Table:
         "mean error; otherwise they are those on the grid."
     )
     records = [record for group in groups for record in group.records]
-    if not all(known(record[f"{name}_mean"]) for record in records for name in QUANTITIES):
+    if not all(known(record[f"{name}_mean"]) for record in records for name in MAIN_OBSERVABLES):
         caption += " A mean is left out where the continuum value of some seed is unknown."
     return Table(caption, shown(SEEDS, records), groups)
 

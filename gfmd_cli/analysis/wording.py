@@ -56,11 +56,11 @@ def _in_si_only(column: TableColumn) -> TableColumn:
 def pressure_text(row: Mapping[str, Any]) -> str:
     """The pressure of a contact, reduced and, where that means something, in Pa."""
     return f"p* = {row['p_star']:.4g}" + (
-        f" ({quantity(row['pressure'], 'Pa')})" if in_si(row, "Pa") else ""
+        f" ({with_unit(row['pressure'], 'Pa')})" if in_si(row, "Pa") else ""
     )
 
 
-def quantity(value: float, unit: str) -> str:
+def with_unit(value: float, unit: str) -> str:
     """A value with its unit."""
     divisor, prefixed = scaled(abs(value), unit)
     return f"{pretty(value / divisor)}{SPACE}{prefixed}"
@@ -82,7 +82,7 @@ def span(values: Iterable[float], unit: str = "") -> str:
     if not finite:
         return "unknown"
     least, most = min(finite), max(finite)
-    low, high = (quantity(end, unit) if unit else pretty(end) for end in (least, most))
+    low, high = (with_unit(end, unit) if unit else pretty(end) for end in (least, most))
     if low == high:
         return low
     bare, _, low_unit = low.rpartition(SPACE)

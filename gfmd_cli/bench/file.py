@@ -15,7 +15,7 @@ from gfmd_cli.spec.differences import differences
 from gfmd_cli.spec.models import Spec
 from gfmd_cli.status import Status
 from gfmd_cli.study.column import Column
-from gfmd_cli.study.columns import BENCH
+from gfmd_cli.study.columns import BENCH_ATTRIBUTE
 from gfmd_cli.study.provenance import origin
 from gfmd_cli.study.reading import DAMAGE, check_column, damage_named
 from gfmd_cli.study.writing import write_column
@@ -80,7 +80,7 @@ def check_target(path: Path, spec: Spec) -> None:
         return
     try:
         with open_hdf5(path) as file:
-            old_spec = json.loads(file.attrs["spec"]) if BENCH in file.attrs else None
+            old_spec = json.loads(file.attrs["spec"]) if BENCH_ATTRIBUTE in file.attrs else None
     except DAMAGE:
         old_spec = None
     if old_spec is None:
@@ -96,7 +96,7 @@ def check_target(path: Path, spec: Spec) -> None:
 def write_bench(path: Path, spec: Spec, text: str, traces: list[Trace]) -> None:
     """Write a bench file, a group for each trace, whole or not at all. Raises SpaceError."""
     with new_file(target_of(path)) as fresh, new_hdf5(fresh) as file:
-        file.attrs.update({BENCH: BENCH_LAYOUT, **origin(spec, text)})
+        file.attrs.update({BENCH_ATTRIBUTE: BENCH_LAYOUT, **origin(spec, text)})
         for number, trace in enumerate(traces):
             group = file.create_group(f"runs/{number}")
             group.attrs.update(trace.row)
@@ -114,7 +114,7 @@ def read_bench(path: Path) -> list[Trace]:
     if not path.exists():
         raise InputError(f"{path}: no such bench file")
     with damage_named(path, "bench file"), open_hdf5(path) as file:
-        if file.attrs.get(BENCH) != BENCH_LAYOUT:
+        if file.attrs.get(BENCH_ATTRIBUTE) != BENCH_LAYOUT:
             raise StudyError(f"{path}: not a bench file of layout {BENCH_LAYOUT}")
         runs = find(file, "runs")
         return [_read_trace(find(runs, str(number))) for number in range(len(runs))]

@@ -19,7 +19,7 @@ from gfmd_cli.analysis.wording import contact_and_boundary, points_text
 from gfmd_cli.bench.file import Trace
 from gfmd_cli.bench.run import REFERENCE
 from gfmd_cli.grid.arrays import Field
-from gfmd_cli.physics.observables import QUANTITIES
+from gfmd_cli.physics.observables import MAIN_OBSERVABLES
 from gfmd_cli.status import Status
 from gfmd_cli.study.columns import PARAMETERS
 
@@ -45,7 +45,7 @@ BENCH = (
     TableColumn("solver", "name"),
     *(TableColumn(f"transforms\nto {level}", f"transforms_{level}", ".0f") for level in LEVELS),
     *(TableColumn(f"seconds\nto {level}", f"seconds_{level}", ".3g") for level in LEVELS),
-    *(TableColumn(f"error of\n{name}", f"{name}_error", ".1e") for name in QUANTITIES),
+    *(TableColumn(f"error of\n{name}", f"{name}_error", ".1e") for name in MAIN_OBSERVABLES),
     RESIDUAL,
     STATUS,
 )
@@ -80,7 +80,9 @@ def _record(trace: Trace, name: str) -> Record:
     for level in LEVELS:
         transforms, seconds = trace.reached("u_g", float(level)) or (None, None)
         record |= {f"transforms_{level}": transforms, f"seconds_{level}": seconds}
-    errors = {f"{error}_error": float(trace.samples[f"{error}_error"][-1]) for error in QUANTITIES}
+    errors = {
+        f"{error}_error": float(trace.samples[f"{error}_error"][-1]) for error in MAIN_OBSERVABLES
+    }
     return record | errors
 
 

@@ -17,7 +17,7 @@ from gfmd_cli.bench.file import Trace
 from gfmd_cli.errors import InputError
 from gfmd_cli.physics.contact import Contact
 from gfmd_cli.physics.free_contact import SCENES
-from gfmd_cli.physics.observables import QUANTITIES, Observables, observe
+from gfmd_cli.physics.observables import MAIN_OBSERVABLES, Observables, observe
 from gfmd_cli.solvers.auto import Auto
 from gfmd_cli.solvers.ccg import ConstrainedCG
 from gfmd_cli.solvers.fire import Fire
@@ -26,7 +26,7 @@ from gfmd_cli.solvers.nested_grids import Solution, solve_contact
 from gfmd_cli.solvers.polonsky_keer import PolonskyKeer
 from gfmd_cli.spec.models import LOADS, Spec
 from gfmd_cli.study.columns import PARAMETERS
-from gfmd_cli.study.context import Progress, Report
+from gfmd_cli.study.context import ProgressEvent, Report
 from gfmd_cli.study.measure import planned
 from gfmd_cli.study.resources import check_memory
 from gfmd_cli.study.tasks import Task, plan
@@ -72,16 +72,20 @@ class Recorder:
     def _sample(
         self, contact: Contact, state: State | Solution, transforms: float, now: float
     ) -> None:
-        errors = (np.nan,) * len(QUANTITIES)
+        errors = (np.nan,) * len(MAIN_OBSERVABLES)
         if contact is self.contact:
             with np.errstate(invalid="ignore", over="ignore"):  # of a solve that diverges
                 observables = observe(contact, state.u, state.sigma)
             self.a_r = observables.a_r
-            errors = tuple(_distance(observables, self.reference, name) for name in QUANTITIES)
+            errors = tuple(
+                _distance(observables, self.reference, name) for name in MAIN_OBSERVABLES
+            )
         points, seconds = contact.grid.points, now - self.begun - self.own
         self.samples.append((transforms, seconds, points, state.residual, *errors))
         step = state.step if isinstance(state, State) else state.steps
-        self.report(Progress(self.run, "step", self.label, points, step, state.residual, self.a_r))
+        self.report(
+            ProgressEvent(self.run, "step", self.label, points, step, state.residual, self.a_r)
+        )
 
 
 def _distance(observables: Observables, reference: Observables, name: str) -> float:
@@ -123,10 +127,8 @@ def run_bench(spec: Spec, report: Report) -> list[Trace]:
     an elastomer.
     """
     tasks = plan(spec, suited=False)  # `solvers_to_compare` leaves out those that do not suit
-    if LOADS[spec.load.quantity].searched:
-        raise InputError(
-            f"load.{spec.load.quantity}: gfmd bench needs load.p_star or load.pressure"
-        )
+    if LOADS[spec.load.key].searched:
+        raise InputError(f"load.{spec.load.key}: gfmd bench needs load.p_star or load.pressure")
     if any(task.auto for task in tasks):
         raise InputError('grid.points: gfmd bench needs a number, not "auto"')
     check_memory(tasks)
@@ -134,7 +136,7 @@ def run_bench(spec: Spec, report: Report) -> list[Trace]:
         for named in spec.solver:
             if not _suits(named, task):
                 left_out = f"{named.kind} is left out, as it does not suit {elastomer.label}"
-                report(Progress(-1, "warning", "", message=left_out))
+                report(ProgressEvent(-1, "warning", "", message=left_out))
     traces: list[Trace] = []
     for in_scene in grouped(tasks, lambda task: task.scene_id).values():
         first = in_scene[0]
@@ -145,7 +147,7 @@ def run_bench(spec: Spec, report: Report) -> list[Trace]:
             contact = scene.contact(task.p_star(scene.delta_sigma))
             reference, residual = solve_reference(contact)
             row = planned(task) | {"p_star": contact.pressure, "reference_residual": residual}
-            row |= {f"{name}_reference": getattr(reference, name) for name in QUANTITIES}
+            row |= {f"{name}_reference": getattr(reference, name) for name in MAIN_OBSERVABLES}
             for solver in solvers_to_compare(spec, task, contact):
                 traces.append(_trace(contact, solver, reference, row, report, len(traces)))
     if not traces:
@@ -163,14 +165,14 @@ def _trace(
 ) -> Trace:
     """Solve a contact, with samples of the error."""
     label = f"{solver.kind} {row['elastomer']} {row['points']} p*={row['p_star']:.4g}"
-    report(Progress(run, "start", label))
+    report(ProgressEvent(run, "start", label))
     warm_up = solver.model_copy(update={"max_steps": 1})  # plans of all grids, pages of memory
     solve_contact(contact, warm_up)
     recorder = Recorder(contact, reference, report, run, label)
     solution = solve_contact(contact, solver, recorder)
     recorder.end(solution)
     points, residual, status = contact.grid.points, solution.residual, solution.status
-    report(Progress(run, "end", label, points, solution.steps, residual, recorder.a_r, status))
+    report(ProgressEvent(run, "end", label, points, solution.steps, residual, recorder.a_r, status))
     values = solver.parameters()
     outcome = {
         **{each.column.name: each.cell(values) for each in PARAMETERS if each.table == "solver"},

@@ -10,7 +10,7 @@ from gfmd_cli.cli.messages import print_error, printable
 from gfmd_cli.units import count, duration
 
 if TYPE_CHECKING:
-    from gfmd_cli.study.context import Progress, Report
+    from gfmd_cli.study.context import ProgressEvent, Report
 
 LOG_EVERY = 60.0  # seconds between two lines where stderr is no terminal
 TASK_BAR = "{desc}: {n_fmt} steps, {elapsed}{postfix}"
@@ -36,7 +36,7 @@ class Reporter:
         for task in list(self.bars):
             self._close(task)
 
-    def show(self, progress: "Progress") -> None:
+    def show(self, progress: "ProgressEvent") -> None:
         """One event of one task."""
         if progress.status is not None and progress.status.is_failure:
             self.failed[progress.task] = progress.message
@@ -52,7 +52,7 @@ class Reporter:
         else:
             self._line(progress)
 
-    def _bar(self, progress: "Progress") -> None:
+    def _bar(self, progress: "ProgressEvent") -> None:
         from tqdm import tqdm
 
         if progress.tasks_left is not None:
@@ -76,7 +76,7 @@ class Reporter:
             with suppress(OSError):
                 bar.close()
 
-    def _line(self, progress: "Progress") -> None:
+    def _line(self, progress: "ProgressEvent") -> None:
         now = time.monotonic()
         if progress.event not in ("end", "step") or now - self.last_line < LOG_EVERY:
             return
@@ -88,13 +88,13 @@ class Reporter:
         )
 
 
-def _state(progress: "Progress") -> str:
+def _state(progress: "ProgressEvent") -> str:
     """Residual and, where it is known, contact area."""
     a_r = f", a_r {progress.a_r:.4g}" if isfinite(progress.a_r) else ""
     return f"residual {progress.residual:.1e}{a_r}"
 
 
-def _left(progress: "Progress") -> str:
+def _left(progress: "ProgressEvent") -> str:
     """Number of tasks and time that are left."""
     if progress.tasks_left is None:
         return ""

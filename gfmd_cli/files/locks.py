@@ -31,21 +31,21 @@ OWNED_SECONDS = 600.0  # to wait for the owner of a plain lock, who may be dead 
 log = logging.getLogger(__name__)
 
 
-class Waits(NamedTuple):
+class WaitOptions(NamedTuple):
     """How a process waits for locks."""
 
     stop: Event | None = None
     """Once set, a process that has waited long raises Interrupted."""
     until: float = inf
     """Time of the monotonic clock after which such a process does so, too [s]."""
-    run: int = 0
+    run_pid: int = 0
     """Process id of the run that started this worker, 0 if this is none.
 
-    Waits for other workers of the run are not announced.
+    Waiting for other workers of the run is not announced.
     """
 
 
-AS_LONG_AS_NEEDED = Waits()
+AS_LONG_AS_NEEDED = WaitOptions()
 
 
 class _Owner(NamedTuple):
@@ -62,13 +62,17 @@ class _Owner(NamedTuple):
 
 @contextmanager
 def locked(
-    path: Path, *, shared: bool = False, wait: bool = True, waits: Waits = AS_LONG_AS_NEEDED
+    path: Path,
+    *,
+    shared: bool = False,
+    wait: bool = True,
+    wait_options: WaitOptions = AS_LONG_AS_NEEDED,
 ) -> Iterator[bool]:
     """Hold a lock file inside the block; the kernel releases that of a process that dies.
 
     The holder may delete the file: a process that waited for it then locks a new one. Yields
     whether the lock was obtained, always true if `wait` is. Raises SpaceError where the file cannot
-    be written, and Interrupted (see `Waits`). A long wait is announced once.
+    be written, and Interrupted (see `WaitOptions`). A long wait is announced once.
 
     On a file system without locks, the lock is a file beside it with the name of its owner, which
     others respect. It cannot be shared: a second process is refused with a SpaceError, and so is
@@ -76,7 +80,7 @@ def locked(
     that remove it at the same moment may both go on.
     """
     operation = (fcntl.LOCK_SH if shared else fcntl.LOCK_EX) | fcntl.LOCK_NB
-    waiting = _Wait(path, waits)
+    waiting = _Wait(path, wait_options)
     while True:
         with _opened(path) as file:
             try:
@@ -97,15 +101,15 @@ def locked(
                 finally:
                     fcntl.flock(file, fcntl.LOCK_UN)  # a process forked meanwhile holds it, too
                 return
-    with _owned(path.with_name(f"{path.name}.owner"), shared, wait, waits) as acquired:
+    with _owned(path.with_name(f"{path.name}.owner"), shared, wait, wait_options) as acquired:
         yield acquired
 
 
 class _Wait:
     """A wait for a lock, from now on."""
 
-    def __init__(self, path: Path, waits: Waits) -> None:
-        self.path, self.waits = path, waits
+    def __init__(self, path: Path, wait_options: WaitOptions) -> None:
+        self.path, self.wait_options = path, wait_options
         self.since, self.is_announced = time.monotonic(), False
 
     def pause(self, find_owner: Callable[[], _Owner | None]) -> None:
@@ -118,10 +122,10 @@ class _Wait:
         if waited > LONG_SECONDS:
             owner = find_owner()
             by = str(owner or "another process")
-            stop, until, run = self.waits
+            stop, until, run_pid = self.wait_options
             if (stop is not None and stop.is_set()) or time.monotonic() > until:
                 raise Interrupted(f"stopped; {self.path} is in use by {by}; run again to continue")
-            is_foreign = run == 0 or owner is None or _parent(owner.pid) != run
+            is_foreign = run_pid == 0 or owner is None or _parent(owner.pid) != run_pid
             if is_foreign and not self.is_announced:
                 log.warning("gfmd: waiting for %r, in use by %s", str(self.path), ascii(by)[1:-1])
                 self.is_announced = True
@@ -170,14 +174,14 @@ def _is_at(descriptor: int, path: Path) -> bool:
 
 
 @contextmanager
-def _owned(path: Path, shared: bool, wait: bool, waits: Waits) -> Iterator[bool]:
+def _owned(path: Path, shared: bool, wait: bool, wait_options: WaitOptions) -> Iterator[bool]:
     """A lock by a plain file.
 
     Raises SpaceError for a shared one that another process has, for one that another process has
     for too long, and for a file that is no lock.
     """
     known, since = None, time.monotonic()
-    waiting = _Wait(path, waits)
+    waiting = _Wait(path, wait_options)
     while not _claim(path):
         owner, now = _owner(path), time.monotonic()
         if owner != known:  # another process, or one that writes its name just now

@@ -84,7 +84,7 @@ class Grid:
         return tuple(side / points for side, points in pairs)
 
     @property
-    def resolution(self) -> float:
+    def effective_points(self) -> float:
         """Number of points along x if their spacing were the wider one of both axes."""
         if self.dimension == 1:
             return float(self.points)

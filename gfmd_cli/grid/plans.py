@@ -30,7 +30,7 @@ import pyfftw
 from gfmd_cli.errors import SpaceError
 from gfmd_cli.files.atomic import remove_temporary, write_whole
 from gfmd_cli.files.cache import cache_folder
-from gfmd_cli.files.locks import AS_LONG_AS_NEEDED, Waits, locked
+from gfmd_cli.files.locks import AS_LONG_AS_NEEDED, WaitOptions, locked
 from gfmd_cli.files.regular import read_regular
 
 T = TypeVar("T")
@@ -89,7 +89,7 @@ class _Planning(NamedTuple):
     folder: Path | None = None
     """Where wisdom is kept; None for the cache."""
     estimated: bool = False
-    waits: Waits = AS_LONG_AS_NEEDED
+    wait_options: WaitOptions = AS_LONG_AS_NEEDED
     """For other processes that measure."""
 
 
@@ -103,13 +103,13 @@ _estimates: Wisdom = {}
 
 
 def plan_with(
-    folder: Path | None, *, estimated: bool = False, waits: Waits = AS_LONG_AS_NEEDED
+    folder: Path | None, *, estimated: bool = False, wait_options: WaitOptions = AS_LONG_AS_NEEDED
 ) -> str | None:
     """From now on store wisdom in `folder`, which starts with that of the cache, or only estimate.
 
     This holds for the calling thread. Returns a warning if the folder's wisdom is damaged.
     """
-    _planning.set(_Planning(folder, estimated, waits))
+    _planning.set(_Planning(folder, estimated, wait_options))
     with _planner:
         _known.clear()
         _without_lock.clear()
@@ -276,7 +276,9 @@ def _planning_lock(folder: Path) -> Iterator[bool]:
         is_locked = os.path.isdir(folder) and folder not in _without_lock  # Path.is_dir can raise
         if is_locked:
             try:
-                stack.enter_context(locked(folder / "planning", waits=_planning.get().waits))
+                stack.enter_context(
+                    locked(folder / "planning", wait_options=_planning.get().wait_options)
+                )
             except SpaceError:  # it may have taken minutes: not again
                 _without_lock.add(folder)
                 is_locked = False

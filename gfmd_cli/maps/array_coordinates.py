@@ -43,7 +43,7 @@ class Axis(NamedTuple):
     """Name of its dimension scale, "" where it has none."""
     step: float | None
     """Signed distance of neighbouring points, None where no positions are stored."""
-    metres: float | None
+    metres_per_unit: float | None
     """Metres per unit of the positions, None where they state no unit."""
 
 
@@ -62,14 +62,14 @@ def _text(value: Any) -> str:
     return " ".join(map(str, texts)).strip()
 
 
-def in_metres(unit: str) -> float | None:
+def metres_per_unit(unit: str) -> float | None:
     """Metres per unit of a text such as "nm" or "[um]"; None where the unit is not known."""
     return METRES_PER_UNIT.get(unit.strip().strip("[]()").strip())
 
 
-def factor(name: str, unit: str) -> float | None:
+def checked_metres_per_unit(name: str, unit: str) -> float | None:
     """Metres per unit, None without a unit. Raises InputError for an unknown one."""
-    metres = in_metres(unit)
+    metres = metres_per_unit(unit)
     if unit and metres is None:
         raise InputError(
             f"{name} states the unit {unit!r}; known are {', '.join(KNOWN_UNITS)}: convert it"
@@ -99,4 +99,4 @@ def axis_of(file: Any, dimension: Any) -> Axis:
             f"the positions {label!r} are not evenly spaced: resample the map, or save it "
             "without them"
         )
-    return Axis(label, step, factor(repr(label), stated_unit(scale)))
+    return Axis(label, step, checked_metres_per_unit(repr(label), stated_unit(scale)))

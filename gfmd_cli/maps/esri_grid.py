@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from gfmd_cli.errors import InputError
-from gfmd_cli.maps.height_map import HeightMap, check_layout, extent
+from gfmd_cli.maps.height_map import HeightMap, check_layout, shape_text
 from gfmd_cli.maps.text_tables import in_utf8, with_blanks
 
 SIGNATURE = re.compile(rb"(\xef\xbb\xbf)?\s*n(cols|rows)\s", re.IGNORECASE)
@@ -57,5 +57,5 @@ def _check_rows(counts: list[int], rows: int, columns: int) -> None:
         or sum(counts) != rows * columns
         or not ends.issuperset(range(columns, sum(counts), columns))
     ):
-        found = extent((len(counts), counts[0])) if is_even else f"{sum(counts)}"
-        raise InputError(f"{found} heights, but the header states {extent((rows, columns))}")
+        found = shape_text((len(counts), counts[0])) if is_even else f"{sum(counts)}"
+        raise InputError(f"{found} heights, but the header states {shape_text((rows, columns))}")

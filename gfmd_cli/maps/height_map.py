@@ -15,7 +15,12 @@ import numpy as np
 
 from gfmd_cli.errors import InputError
 from gfmd_cli.files.checksums import MAX_COMPRESSION
-from gfmd_cli.maps.array_coordinates import AXIS_NAMES, axis_of, factor, stated_unit
+from gfmd_cli.maps.array_coordinates import (
+    AXIS_NAMES,
+    axis_of,
+    checked_metres_per_unit,
+    stated_unit,
+)
 from gfmd_cli.units import count, left_out
 
 MAX_MAP_BYTES = 2**33  # 32768 x 32768 heights in double precision
@@ -48,7 +53,7 @@ class HeightMap:
     """Extent along each axis, None where the file does not state it."""
     source: str
     """Format, and dataset or channel."""
-    metres: bool = False
+    metric_sides: bool = False
     """Whether the sides are in metres, not in an unknown unit."""
     metric_heights: bool = False
     """Whether the heights are in metres, not in an unknown unit."""
@@ -74,17 +79,18 @@ def check_layout(shape: tuple[int, ...], dtype: np.dtype[Any]) -> None:
     if min(shape) < SMALLEST_MAP:
         profile = "; save a line profile as an array of one dimension" if len(shape) == 2 else ""
         raise InputError(
-            f"{extent(shape)} points; at least {SMALLEST_MAP} along each axis are needed{profile}"
+            f"{shape_text(shape)} points; at least {SMALLEST_MAP} along each axis are "
+            f"needed{profile}"
         )
     needed = math.prod(shape) * np.dtype(np.float64).itemsize
     if needed > MAX_MAP_BYTES:
         raise InputError(
-            f"{extent(shape)} heights take {needed} bytes; at most {MAX_MAP_BYTES} are "
+            f"{shape_text(shape)} heights take {needed} bytes; at most {MAX_MAP_BYTES} are "
             "allowed: resample the map, or save a part of it"
         )
 
 
-def extent(shape: Sequence[int]) -> str:
+def shape_text(shape: Sequence[int]) -> str:
     """Numbers of points along x and y as text, from the shape of an array [y, x]."""
     return " x ".join(map(str, reversed(shape)))
 
@@ -186,10 +192,10 @@ def _with_coordinates(file: Any, data: Any, bare: HeightMap) -> HeightMap:
         return replace(bare, heights=heights, notes=(note,) if stated_unit(data) else ())
     heights = heights[tuple(slice(None, None, -1 if step < 0 else None) for step in steps)]
     sides = [abs(step) * points for step, points in zip(steps, heights.shape, strict=True)]
-    metres = factor(repr(data.name), stated_unit(data))
-    metric = [axis.metres for axis in axes if axis.metres]
+    metres = checked_metres_per_unit(repr(data.name), stated_unit(data))
+    metric = [axis.metres_per_unit for axis in axes if axis.metres_per_unit]
     if 0 < len(metric) < len(axes):
-        bare_name = next(axis.name for axis in axes if not axis.metres)
+        bare_name = next(axis.name for axis in axes if not axis.metres_per_unit)
         raise InputError(
             f"the positions {bare_name!r} state no unit, those of the other axis do: add it"
         )
@@ -202,7 +208,7 @@ def _with_coordinates(file: Any, data: Any, bare: HeightMap) -> HeightMap:
         bare,
         heights=heights,
         sides=tuple(sides) if metric or metres is None else None,
-        metres=bool(metric),
+        metric_sides=bool(metric),
         periodic=False if metric and metres is not None else None,
         metric_heights=metres is not None,
     )

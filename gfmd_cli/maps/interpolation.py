@@ -15,7 +15,7 @@ from gfmd_cli.grid.modes import multiplicity
 
 Interpolation = Literal["fourier", "monotone"]
 """How heights between the points of a map are obtained."""
-Beyond = Literal["wrap", "symmetric"]
+PadMode = Literal["wrap", "symmetric"]
 """How heights go on beyond the border of a map: repeated, or mirrored; modes of `numpy.pad`."""
 
 MAX_SHORT_WAVES = 2e-3
@@ -46,20 +46,20 @@ def suited_interpolation(heights: Field, *, mirrored: bool = False) -> Interpola
     plateaus only: a random surface sampled at two points per shortest wave has both properties.
     Both tests do not see a step along an axis of a rough map, so that jumps are counted as well.
     """
-    beyond: Beyond = "symmetric" if mirrored else "wrap"
-    if _jumps(heights, beyond) > MAX_JUMPS:  # a step along an axis has no waves in the corners
+    pad_mode: PadMode = "symmetric" if mirrored else "wrap"
+    if _jumps(heights, pad_mode) > MAX_JUMPS:  # a step along an axis has no waves in the corners
         return "monotone"
-    corners, borders = _short_waves(np.atleast_2d(heights), beyond)  # a line has no corners
+    corners, borders = _short_waves(np.atleast_2d(heights), pad_mode)  # a line has no corners
     is_short = borders > MAX_SHORT_WAVES and (
-        heights.ndim == 1 or _ties(heights, beyond) > MAX_TIES
+        heights.ndim == 1 or _ties(heights, pad_mode) > MAX_TIES
     )
     return "monotone" if is_short or corners > MAX_SHORT_WAVES else "fourier"
 
 
-def _short_waves(heights: Field, beyond: Beyond) -> tuple[float, float]:
+def _short_waves(heights: Field, pad_mode: PadMode) -> tuple[float, float]:
     """Fractions of the squared slope in the corners and along the borders of the spectrum."""
     rows, columns = heights.shape
-    if beyond == "symmetric":  # modes of the mirrored map: of the cosine transform, and a phase
+    if pad_mode == "symmetric":  # modes of the mirrored map: of the cosine transform, and a phase
         modes = dctn(heights - heights.mean())
         y, x = np.arange(rows)[:, None] / rows, np.arange(columns) / columns
         of_y, of_x = 1 + (y > 0), 1 + (x > 0)  # with the opposite waves
@@ -78,28 +78,28 @@ def _short_waves(heights: Field, beyond: Beyond) -> tuple[float, float]:
     return float(sums[1]) / total, float(sums[2]) / total
 
 
-def _ties(heights: Field, beyond: Beyond) -> float:
+def _ties(heights: Field, pad_mode: PadMode) -> float:
     """Fraction of the pairs of neighbours with the same height."""
-    around = np.pad(heights, ((1, 0), (1, 0)), mode=beyond)
+    around = np.pad(heights, ((1, 0), (1, 0)), mode=pad_mode)
     before = around[:-1, 1:], around[1:, :-1]
     return float(np.mean([np.mean(heights == others) for others in before]))
 
 
-def _jumps(heights: Field, beyond: Beyond) -> float:
+def _jumps(heights: Field, pad_mode: PadMode) -> float:
     """Fraction of the squared differences of neighbours in isolated jumps, on the worse axis.
 
     A jump is isolated where it is `ISOLATED_RATIO` times larger than the two differences before it
     and the two after it.
     """
     rows = np.atleast_2d(heights)
-    return max(_jumps_along(lines, beyond) for lines in (rows, rows.T)[: heights.ndim])
+    return max(_jumps_along(lines, pad_mode) for lines in (rows, rows.T)[: heights.ndim])
 
 
-def _jumps_along(lines: Field, beyond: Beyond) -> float:
+def _jumps_along(lines: Field, pad_mode: PadMode) -> float:
     """See `_jumps`; along the last axis."""
     total = isolated = 0.0
     for block in row_blocks(lines):
-        steps = np.abs(np.diff(np.pad(lines[block], ((0, 0), (3, 2)), mode=beyond)))
+        steps = np.abs(np.diff(np.pad(lines[block], ((0, 0), (3, 2)), mode=pad_mode)))
         around = [steps[:, shift : shift + lines.shape[1]] for shift in (0, 1, 3, 4)]
         own = steps[:, 2:-2]
         jumps = own[own > ISOLATED_RATIO * np.maximum.reduce(around)]

@@ -22,19 +22,19 @@ to 3000 points a side, with and without missing heights."""
 DEGREES: dict[Levelling, int] = {"mean": 0, "plane": 1, "curvature": 2}
 
 
-def level(heights: Field, degree: Levelling, known: Mask | None = None) -> Field:
+def level(heights: Field, levelling: Levelling, known: Mask | None = None) -> Field:
     """Subtract the least-squares polynomial of total degree 0, 1 or 2 in x and y.
 
     "mean" subtracts 1; "plane" 1, x, y; "curvature" 1, x, y, x^2, x y, y^2; "none" nothing. The
     polynomial is fitted to the heights that are known, all of them by default, and subtracted
     everywhere. The coordinates run from -1 to 1.
     """
-    if degree == "none":
+    if levelling == "none":
         return heights
     rows = np.atleast_2d(heights)
-    basis_y, basis_x = (_polynomials(points, DEGREES[degree]) for points in rows.shape)
+    basis_y, basis_x = (_polynomials(points, DEGREES[levelling]) for points in rows.shape)
     order = np.add.outer(np.arange(basis_y.shape[1]), np.arange(basis_x.shape[1]))
-    terms = order <= DEGREES[degree]
+    terms = order <= DEGREES[levelling]
     coefficients = np.zeros(terms.shape)
     if known is None:  # products of orthonormal polynomials are orthonormal: a projection
         coefficients[terms] = (basis_y.T @ rows @ basis_x)[terms]
@@ -60,7 +60,7 @@ def _products(basis: Field) -> Field:
     return (basis[:, :, None] * basis[:, None, :]).reshape(len(basis), -1)
 
 
-def make_periodic(heights: Field, how: Edges, taper: float = 0.1) -> Field:
+def make_periodic(heights: Field, edges: Edges, taper: float = 0.1) -> Field:
     """Make levelled heights periodic, without a jump across the border of the cell.
 
     "window" : Tukey window, heights -> mean + w (heights - mean), see `window`. The cell keeps its
@@ -76,9 +76,9 @@ def make_periodic(heights: Field, how: Edges, taper: float = 0.1) -> Field:
     heights : shape (rows, columns), or (points,) of a line
     taper : width of the tapered zone at each edge as a fraction of the side, 0 < taper <= 1/2
     """
-    if how == "none":
+    if edges == "none":
         return heights
-    if how == "mirror":
+    if edges == "mirror":
         return mirror(heights)
     mean = heights.mean()
     return mean + window(heights.shape, taper) * (heights - mean)

@@ -77,7 +77,7 @@ def unknown_side(topography: Topography, scale: float, length: float | None) -> 
     """
     if length is None:
         return "the file does not state its side in metres; L = 1 m is assumed: set surface.length"
-    if topography.metres:
+    if topography.metric_sides:
         return ""
     if scale == 1.0:
         return (
@@ -97,7 +97,7 @@ def unit_of_heights(topography: Topography, scale: float) -> str:
     """
     if topography.metric_heights and scale != 1.0:
         return "the file states the unit of its heights: surface.scale multiplies metres"
-    if scale != 1.0 or not topography.metres or topography.metric_heights:
+    if scale != 1.0 or not topography.metric_sides or topography.metric_heights:
         return ""
     return (
         "the file states the unit of its sides, but not of its heights; metres are assumed: set "

@@ -16,7 +16,7 @@ import numpy as np
 from gfmd_cli.errors import INSTALL, InputError
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.maps import text_tables
-from gfmd_cli.maps.array_coordinates import EVEN_TOLERANCE, in_metres
+from gfmd_cli.maps.array_coordinates import EVEN_TOLERANCE, metres_per_unit
 from gfmd_cli.maps.height_map import (
     MAX_HEIGHT,
     MAX_MAP_BYTES,
@@ -25,9 +25,9 @@ from gfmd_cli.maps.height_map import (
     HeightMap,
     at_equal_distances,
     check_layout,
-    extent,
     first_line,
     only_map,
+    shape_text,
 )
 from gfmd_cli.maps.point_tables import NO_GRID, read_points
 from gfmd_cli.maps.text_tables import MATRIX_COLUMNS, OF_SIDES, is_height, is_number
@@ -222,7 +222,7 @@ def _read_channel(path: Path, file: BinaryIO, reader: Any, dataset: str | None) 
         notes=(note,),
         heights=heights,
         sides=None if unsized else sides,
-        metres=has_unit or metric_sides is not None,
+        metric_sides=has_unit or metric_sides is not None,
         periodic=None if rows_along_y else bool(scan.is_periodic),
         source=f"{kind}, {channel.channel_id}"
         + ("" if scan.is_uniform else ", interpolated at equal distances"),
@@ -276,7 +276,7 @@ def _check_nova(lines: list[bytes]) -> None:
             "not applied: are the heights those of the table, or to be multiplied? Save them "
             "multiplied, with a factor of 1"
         )
-    if len(set(map(in_metres, units))) > 1:
+    if len(set(map(metres_per_unit, units))) > 1:
         raise InputError("'Unit Y' is not 'Unit X'; save both sides in the same unit")
 
 
@@ -320,7 +320,7 @@ def _cut_off(shape: tuple[int, ...], sides: tuple[float, ...]) -> str:
     if abs(octaves - round(octaves)) < MAX_OFF_SQUARE:
         return ""
     return (
-        f"the sides in the header and {extent(shape)} heights make pixels of {along_x:.3g} m x "
+        f"the sides in the header and {shape_text(shape)} heights make pixels of {along_x:.3g} m x "
         f"{along_y:.3g} m: is the table cut off?"
     )
 
@@ -370,7 +370,7 @@ def _sides_with_unit(channel: Any, sides: tuple[float, ...]) -> tuple[float, ...
     header = _metadata(channel)
     unit_x = header.get("xunit") or ""  # which is not a known unit
     units = (header.get("yunit") or unit_x, unit_x)[-len(sides) :]
-    factors = [factor for factor in map(in_metres, units) if factor is not None]
+    factors = [factor for factor in map(metres_per_unit, units) if factor is not None]
     if len(factors) < len(units):
         return None
     return tuple(factor * side for factor, side in zip(factors, sides, strict=True))

@@ -9,7 +9,7 @@ import numpy as np
 
 from gfmd_cli.errors import InputError
 from gfmd_cli.grid.arrays import Field
-from gfmd_cli.maps.array_coordinates import NO_UNITS, factor, in_metres
+from gfmd_cli.maps.array_coordinates import NO_UNITS, checked_metres_per_unit, metres_per_unit
 from gfmd_cli.maps.height_map import (
     HEIGHT_NAMES,
     MAX_HEIGHT,
@@ -81,7 +81,7 @@ def read_points(file: BinaryIO) -> HeightMap | None:
     return HeightMap(
         heights=heights if of_heights is None else of_heights * heights,
         sides=tuple(side * (of or 1.0) for side, of in zip(sides, of_sides[::-1], strict=True)),
-        metres=bool(factors),
+        metric_sides=bool(factors),
         metric_heights=of_heights is not None,
         periodic=False,
         source=f"positions and heights{note}",
@@ -151,7 +151,7 @@ def _order_and_units(lines: list[bytes], count: int) -> tuple[list[int], list[fl
         is_complete = len(of_columns) == count
         if is_complete and any(of_columns):
             units = of_columns
-        is_unclear |= not is_complete and any(in_metres(unit) for unit in of_columns)
+        is_unclear |= not is_complete and any(metres_per_unit(unit) for unit in of_columns)
     units = [units[place] for place in order if units]
     if stated := dict(UNITS_OF_GWYDDION.findall("\n".join(texts))):
         units = [*[stated.get("Lateral", "")] * (count - 1), stated.get("Value", "")]
@@ -161,7 +161,7 @@ def _order_and_units(lines: list[bytes], count: int) -> tuple[list[int], list[fl
             f"the header of the table states units, but not one for each of the {count} "
             f"columns, as {example!r} does: add them, or remove the header"
         )
-    return order, [factor("the header of the table", unit) for unit in units]
+    return order, [checked_metres_per_unit("the header of the table", unit) for unit in units]
 
 
 def _columns_in(text: str, count: int) -> tuple[list[str], list[str]]:

@@ -16,7 +16,7 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from gfmd_cli.errors import InputError
-from gfmd_cli.maps.array_coordinates import in_metres
+from gfmd_cli.maps.array_coordinates import metres_per_unit
 from gfmd_cli.units import count
 
 WINDOW_BYTES = 2**21  # bytes read at a time: 32768 heights of 25 digits take less than half of it
@@ -99,13 +99,13 @@ def is_height(word: bytes) -> bool:
 
 def is_unit(word: str) -> bool:
     """Whether a word of a header is a known unit of length."""
-    return in_metres(word) is not None and word not in AMBIGUOUS_UNITS
+    return metres_per_unit(word) is not None and word not in AMBIGUOUS_UNITS
 
 
 def sides_in(lines: list[bytes]) -> list[float]:
     """Lengths [m] that a header states; two of them are the sides of a matrix."""
     matches = filter(None, map(SIDE.match, lines))
-    sides = [(side[1], in_metres(side[2].decode(errors="replace"))) for side in matches]
+    sides = [(side[1], metres_per_unit(side[2].decode(errors="replace"))) for side in matches]
     return [float(value) * unit for value, unit in sides if is_number(value) and unit is not None]
 
 

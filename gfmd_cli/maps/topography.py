@@ -21,10 +21,10 @@ from gfmd_cli.maps.height_map import (
     REMEDY,
     SMALLEST_MAP,
     HeightMap,
-    extent,
     first_line,
     read_hdf5,
     read_npy,
+    shape_text,
 )
 from gfmd_cli.maps.microscope_files import (
     SIGNATURE_BYTES,
@@ -194,7 +194,7 @@ def _checked(data: HeightMap, region: Region | None, flip: bool, crop: bool) -> 
     spacing = _spacing(data, shape)
     part = data.heights
     if region is not None:
-        part = part[region.slices(shape, spacing if data.metres else None)]
+        part = part[region.slices(shape, spacing if data.metric_sides else None)]
     if crop and part.ndim == 2:
         side = min(part.shape) // 2 * 2
         first = [(points - side) // 2 for points in part.shape]
@@ -203,7 +203,7 @@ def _checked(data: HeightMap, region: Region | None, flip: bool, crop: bool) -> 
     if data.sides is None and heights.ndim == 2:
         if min(shape) < MATRIX_COLUMNS <= MANY_POINTS < max(shape):
             raise InputError(
-                f"an array of {extent(shape)} numbers: positions and heights, not a map? Save "
+                f"an array of {shape_text(shape)} numbers: positions and heights, not a map? Save "
                 "the heights as a matrix, or a line profile as an array of one dimension"
             )
         check_all_are_heights(heights, unsized=False)

@@ -110,7 +110,7 @@ class Contact:
         order = np.argsort(m, kind="stable")
         return m[order], np.concatenate([k, column[1:]])[order]
 
-    def elasticity(self, field: Field, out: Field) -> Field:
+    def apply_stiffness(self, field: Field, out: Field) -> Field:
         """K times a field. Written to `out`, which is returned."""
         return self.grid.apply(self.stiffness, field, out)
 
@@ -172,7 +172,7 @@ class Contact:
             np.copyto(u[rows], self.obstacle[rows], where=change[rows] != 0)
         moves.filter_padded(self.stiffness)
         sigma += change
-        return self.noise(moves.real) * self.as_residual(squares)
+        return self.stress_rounding(moves.real) * self.as_residual(squares)
 
     @cached_property
     def largest_stiffness(self) -> float:
@@ -209,7 +209,7 @@ class Contact:
         """Natural residual from the sum of the squares of min(g, sigma)."""
         return sqrt(squares / self.grid.size) / min(self.pressure, 1.0)
 
-    def noise(self, dtype: "np.dtype[Any]") -> float:
+    def stress_rounding(self, dtype: "np.dtype[Any]") -> float:
         """Estimated rms error of the stress by rounding, divided by the rms displacement.
 
         Rounding is white noise, and short waves dominate its stress: eps / 2 times k_max.
@@ -219,7 +219,7 @@ class Contact:
     def rounding(self, field: Field) -> float:
         """Estimated contribution of the rounding of a displacement to the residual."""
         squares = sum(dot(field[rows], field[rows]) for rows in row_blocks(field))
-        return self.noise(field.dtype) * self.as_residual(self.grid.total(squares))
+        return self.stress_rounding(field.dtype) * self.as_residual(self.grid.total(squares))
 
     def mirrored(self) -> "Contact":
         """This contact, or with a free boundary the periodic contact of the mirrored map."""

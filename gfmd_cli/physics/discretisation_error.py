@@ -22,8 +22,8 @@ from gfmd_cli.physics.error_estimates import (
     NO_ERRORS,
     UNKNOWN,
     Estimate,
+    GridPair,
     GridValues,
-    NestedGrids,
     Verdict,
     area_estimate,
     border_stress,
@@ -193,7 +193,7 @@ class RoughnessScales:
 
 
 @dataclass(frozen=True)
-class Tip:
+class IndenterTip:
     """Tip of a single indenter."""
 
     exponent: float = SMOOTH_EXPONENT
@@ -210,7 +210,7 @@ class Tip:
         return 2 * (self.exponent - n) + self.dimension if self.is_sharp else inf
 
 
-SMOOTH_TIP = Tip()
+SMOOTH_TIP = IndenterTip()
 
 
 def roughness_scales(shells: Shells, length: float) -> RoughnessScales:
@@ -276,7 +276,7 @@ def estimate(
     *,
     same_waves: bool = True,
     stepped: bool = False,
-    tip: Tip = SMOOTH_TIP,
+    tip: IndenterTip = SMOOTH_TIP,
     full_contact_errors: Mapping[str, float] = NO_ERRORS,
 ) -> dict[str, Estimate]:
     """Estimate errors and continuum values of `a_r`, `sigma_p` and `u_g` on the finest grid.
@@ -296,7 +296,7 @@ def estimate(
     """
     ordered = sorted(contacts, key=lambda contact: contact.points)
     coarse = ordered[-2] if len(ordered) > 1 else None
-    grids = NestedGrids(ordered[-1], coarse, max(exponent, 0.0))
+    grids = GridPair(ordered[-1], coarse, max(exponent, 0.0))
     fine, _, n = grids
     excess = area_exponent or ExcessExponent(n)
     is_free, is_rough = fine.border is not None, scales is not None
@@ -333,7 +333,7 @@ def estimate(
     return estimates
 
 
-def _laws_hold(grids: NestedGrids, scales: RoughnessScales) -> bool:
+def _laws_hold(grids: GridPair, scales: RoughnessScales) -> bool:
     """Whether the laws of many patches hold for a contact on a rough surface."""
     if grids.coarse is None and scales.plateau > MAX_PLATEAU:
         return False
@@ -342,10 +342,10 @@ def _laws_hold(grids: NestedGrids, scales: RoughnessScales) -> bool:
 
 def _area_of_any_surface(
     by_change: Estimate,
-    grids: NestedGrids,
+    grids: GridPair,
     scales: RoughnessScales | None,
     excess: ExcessExponent,
-    tip: Tip,
+    tip: IndenterTip,
 ) -> Estimate:
     """The area from its excess, where that is known, or as estimated from the change alone."""
     fine = grids.fine
@@ -377,7 +377,7 @@ def _bar(name: str, typical: float, change: float | None) -> float:
 
 
 def _area(
-    grids: NestedGrids, scales: RoughnessScales | None, excess: ExcessExponent, tip: Tip
+    grids: GridPair, scales: RoughnessScales | None, excess: ExcessExponent, tip: IndenterTip
 ) -> Estimate:
     """Relative contact area: the error is of first order in the spacing, AREA_EXCESS area_n xi.
 
@@ -415,7 +415,7 @@ def _area(
     return _corrected_area(fine.a_r, best, hypot(error, factor * excess.uncertainty * xi))
 
 
-def _plate_area(grids: NestedGrids) -> Estimate:
+def _plate_area(grids: GridPair) -> Estimate:
     """Relative contact area of a plate on a rough surface."""
     if grids.coarse is None:
         return UNKNOWN
@@ -430,7 +430,7 @@ def _corrected_area(a_r: float, best: float, error: float) -> Estimate:
     return area_estimate(a_r, best, abs(a_r - best) + error, error)
 
 
-def _stress(grids: NestedGrids, scales: RoughnessScales | None, tip: Tip) -> Estimate:
+def _stress(grids: GridPair, scales: RoughnessScales | None, tip: IndenterTip) -> Estimate:
     """Stress deviation: at the edge of a patch the stress is as (1 - r^2/a^2)^(1 - n/2)."""
     fine, coarse, n = grids
     if n > MAX_STRESS_EXPONENT:
@@ -451,7 +451,7 @@ def _stress(grids: NestedGrids, scales: RoughnessScales | None, tip: Tip) -> Est
     return Estimate(error, max(0.0, value + rest), EXTRAPOLATED_BAR * error, Verdict.REGULAR)
 
 
-def _single_stress(grids: NestedGrids, tip: Tip) -> Estimate:
+def _single_stress(grids: GridPair, tip: IndenterTip) -> Estimate:
     """Stress deviation of a single indenter, in one or two dimensions."""
     fine, _, n = grids
     value, edge_ratio = fine.sigma_p, fine.switches_per_point / fine.a_r
@@ -463,7 +463,7 @@ def _single_stress(grids: NestedGrids, tip: Tip) -> Estimate:
     return on_grid(value, hypot(SINGLE_CONTACT * abs(rest), floor))
 
 
-def _gap(grids: NestedGrids, scales: RoughnessScales | None, tip: Tip) -> Estimate:
+def _gap(grids: GridPair, scales: RoughnessScales | None, tip: IndenterTip) -> Estimate:
     """Mean gap: the error is small and of either sign, so the value is not extrapolated."""
     fine, coarse, n = grids
     if scales is None:
@@ -490,7 +490,7 @@ def _error_of_gaps(fine: GridValues) -> float:
     return LINE_GAP * fine.u_g / points**2 / sqrt(gaps)
 
 
-def _single_gap(grids: NestedGrids, tip: Tip) -> Estimate:
+def _single_gap(grids: GridPair, tip: IndenterTip) -> Estimate:
     """Mean gap of a single indenter, in one or two dimensions."""
     fine, change = grids.fine, abs(grids.change("u_g"))
     points = fine.points * min(1.0, fine.area)  # along the shorter side

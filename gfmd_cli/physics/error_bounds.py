@@ -125,11 +125,11 @@ def _of_free_contact(contact: FreeContact, u: Field, sigma: Field) -> ErrorBound
     The cost is three transforms of twice the points a side. The bound of sigma_p is NaN where no
     positive lower limit of the compliance is known.
     """
-    grid, p, h, free = contact.grid, contact.pressure, contact.height, contact.free
+    grid, p, h, compliance = contact.grid, contact.pressure, contact.height, contact.compliance
     mean = grid.mean
     s = contact.clear_untouchable(np.maximum(sigma, 0.0))
     s *= p / mean(s)
-    gap = free.displacement(s, out=grid.empty())
+    gap = compliance.displacement(s, out=grid.empty())
     energy, lifted, deflection = mean(s * gap), mean(s * h), mean(gap)
     gap -= h
     touchable = gap if contact.may_touch is None else gap[contact.may_touch]
@@ -140,8 +140,8 @@ def _of_free_contact(contact: FreeContact, u: Field, sigma: Field) -> ErrorBound
     violation = contact.clear_untouchable(np.minimum(gap, s))
     limit = UNCERTAINTY_FACTOR * sqrt(mean(violation**2))
     uncertain = contact.clear_untouchable(np.where(s > 0, s, gap) < limit)
-    mean_compliance = mean(free.displacement(np.ones_like(s), out=gap))
-    smallest = free.smallest_compliance
+    mean_compliance = mean(compliance.displacement(np.ones_like(s), out=gap))
+    smallest = compliance.smallest_compliance
     omitted = sqrt(mean((contact_pressure(contact.obstacle, u, sigma) - s) ** 2))
     return ErrorBounds(
         duality_gap=duality_gap,

@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 from math import hypot, isnan, nan
 from typing import NamedTuple
 
-from gfmd_cli.physics.observables import QUANTITIES, estimated_patches
+from gfmd_cli.physics.observables import MAIN_OBSERVABLES, estimated_patches
 from gfmd_cli.status import ExplainedEnum
 
 # Error bars: FACTOR times the root of the sum of the squares of D and FLOOR times
@@ -73,7 +73,7 @@ class GridValues:
         return estimated_patches(self.perimeter, self.a_r, self.area)
 
 
-class NestedGrids(NamedTuple):
+class GridPair(NamedTuple):
     """One contact on the finest of its grids, and what the errors there follow from."""
 
     fine: GridValues
@@ -125,12 +125,12 @@ class Estimate:
 
 
 UNKNOWN = Estimate(nan, nan, nan, Verdict.UNKNOWN)
-NO_ERRORS = dict.fromkeys(QUANTITIES, 0.0)
+NO_ERRORS = dict.fromkeys(MAIN_OBSERVABLES, 0.0)
 
 
 def unknown() -> dict[str, Estimate]:
     """Estimates that give no number."""
-    return dict.fromkeys(QUANTITIES, UNKNOWN)
+    return dict.fromkeys(MAIN_OBSERVABLES, UNKNOWN)
 
 
 def on_grid(value: float, error: float, verdict: Verdict = Verdict.REGULAR) -> Estimate:
@@ -172,7 +172,7 @@ def full_contact(fine: GridValues, errors: Mapping[str, float]) -> dict[str, Est
     return {name: on_grid(value, errors[name], verdict) for name, value in values.items()}
 
 
-def estimate_by_change(grids: NestedGrids, *, has_flat_top: bool = False) -> dict[str, Estimate]:
+def estimate_by_change(grids: GridPair, *, has_flat_top: bool = False) -> dict[str, Estimate]:
     """Estimates from two nested grids; unknown from one grid or beyond `MAX_EXPONENT`.
 
     `has_flat_top`: whether the surface has flat tops with steep edges.
@@ -184,12 +184,12 @@ def estimate_by_change(grids: NestedGrids, *, has_flat_top: bool = False) -> dic
         return estimates
     by_change = _by_change(grids, FACTOR["u_g"], has_flat_top=has_flat_top)
     return estimates | {
-        name: by_change[name] for name in QUANTITIES if grids.n <= MAX_EXPONENT[name]
+        name: by_change[name] for name in MAIN_OBSERVABLES if grids.n <= MAX_EXPONENT[name]
     }
 
 
 def estimate_free(
-    grids: NestedGrids,
+    grids: GridPair,
     full_contact_errors: Mapping[str, float],
     *,
     same_waves: bool,
@@ -211,7 +211,7 @@ def estimate_free(
     return estimates
 
 
-def border_stress(grids: NestedGrids) -> Estimate:
+def border_stress(grids: GridPair) -> Estimate:
     """Standard deviation of a pressure that is singular at the border of the map, or at a step."""
     if grids.n > MAX_BORDER_EXPONENT:
         return replace(UNKNOWN, verdict=Verdict.DIVERGES if grids.n >= 1 else Verdict.SLOW)
@@ -220,7 +220,7 @@ def border_stress(grids: NestedGrids) -> Estimate:
     return _value_by_change("sigma_p", grids, BORDER_FACTOR / (2 ** (1 - grids.n) - 1))
 
 
-def _by_change(grids: NestedGrids, gap_factor: float, *, has_flat_top: bool) -> dict[str, Estimate]:
+def _by_change(grids: GridPair, gap_factor: float, *, has_flat_top: bool) -> dict[str, Estimate]:
     is_steep = has_flat_top and grids.n > MAX_FLAT_TOP_EXPONENT
     factor = FLAT_TOP_FACTOR if is_steep else FACTOR["sigma_p"]
     return {
@@ -230,7 +230,7 @@ def _by_change(grids: NestedGrids, gap_factor: float, *, has_flat_top: bool) -> 
     }
 
 
-def _area(grids: NestedGrids) -> Estimate:
+def _area(grids: GridPair) -> Estimate:
     """Relative contact area: of first order in the spacing, as contact lines are a point wide."""
     fine, change = grids.fine, grids.change("a_r")
     scale = hypot(change, FLOOR["a_r"] * fine.switches_per_point)
@@ -238,7 +238,7 @@ def _area(grids: NestedGrids) -> Estimate:
     return area_estimate(fine.a_r, best, FACTOR["a_r"] * scale, CONTINUUM_FACTOR * scale)
 
 
-def _value_by_change(name: str, grids: NestedGrids, factor: float) -> Estimate:
+def _value_by_change(name: str, grids: GridPair, factor: float) -> Estimate:
     """sigma_p or u_g: the value on the grid is the best estimate."""
     fine = grids.fine
     value: float = getattr(fine, name)

@@ -22,7 +22,7 @@ from gfmd_cli.grid.arrays import Field, Mask, MaskedField
 from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.maps import map_warnings, misread
 from gfmd_cli.maps.gaussian_filter import MIN_SPACINGS, gaussian_filter
-from gfmd_cli.maps.height_map import extent
+from gfmd_cli.maps.height_map import shape_text
 from gfmd_cli.maps.interpolation import (
     Interpolation,
     at_centres,
@@ -205,7 +205,7 @@ class FileSurface(RigidSurface):
 
     def smallest_grid_reason(self) -> str:
         """Reason for the smallest grid: the points of the map."""
-        return f"a map of {extent(self._topography().heights.shape)} points"
+        return f"a map of {shape_text(self._topography().heights.shape)} points"
 
     def parameters(self) -> dict[str, Any]:
         """Value of every key, with the defaults that depend on the file as they are applied."""
@@ -239,7 +239,7 @@ class FileSurface(RigidSurface):
         topography = self._topography()
         if topography.spacing is None:
             return None
-        factor = 1.0 if topography.metres else self.scale
+        factor = 1.0 if topography.metric_sides else self.scale
         shape = topography.heights.shape
         return tuple(factor * (n * step) for n, step in zip(shape, topography.spacing, strict=True))
 
@@ -426,7 +426,7 @@ class FileSurface(RigidSurface):
             side = (self.length or stated[-1]) * (stated[0] / stated[-1]) if stated else None
             warnings.append(map_warnings.given_side("length_y", self.length_y, side, topography))
         if self.length is not None:
-            side = stated[-1] if stated and topography.metres else None
+            side = stated[-1] if stated and topography.metric_sides else None
             warnings.append(map_warnings.given_side("length", self.length, side, topography))
         else:
             length = stated[-1] if stated else None
@@ -438,13 +438,13 @@ class FileSurface(RigidSurface):
         topography, levelling = self._topography(), self.levelling()
         missing = count(topography.missing_count, "missing height")
         is_free, own_shape = boundary == "free", topography.heights.shape
-        size = f"{extent(topography.shape)} points"
+        size = f"{shape_text(topography.shape)} points"
         if self.dimension == 1:
             size = f"profile of {size}, the same at all y (line contact)"
         steps = {
             f"{self.path.name} ({topography.source}): {size}": True,
             f"region {self.region}": self.region is not None,
-            f"cropped to {extent(own_shape)}": self.crop and own_shape != topography.shape,
+            f"cropped to {shape_text(own_shape)}": self.crop and own_shape != topography.shape,
             "turned upside down": self.flip,
             f"{missing} {'never touch' if self.missing == 'void' else 'filled in'}": bool(
                 topography.missing_count

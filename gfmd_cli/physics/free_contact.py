@@ -36,7 +36,7 @@ without padding, 36 with this, 33 with twofold padding (n = 1); 302 and 157 (n =
 
 
 @dataclass(frozen=True)
-class FreeElasticity:
+class FreeCompliance:
     """Compliance of an elastomer without borders on a grid, in reduced units."""
 
     elastomer: LinearElastomer
@@ -101,17 +101,17 @@ class FreeContact(Contact):
     """
 
     boundary: ClassVar[str] = "free"
-    free: FreeElasticity = field(kw_only=True)
+    compliance: FreeCompliance = field(kw_only=True)
 
     @property
     def exponents(self) -> tuple[float, float]:
         """The exponent of a power law as both limits; infinite limits for any other k(q)."""
-        n = self.free.elastomer.exponent
+        n = self.compliance.elastomer.exponent
         return (-inf, inf) if n is None else (n, n)
 
     def recompute(self, u: Field, sigma: Field) -> float:
         """Compute u from sigma, u = h in contact and above it elsewhere; return the residual."""
-        gap = self.free.displacement(sigma, out=self.grid.empty())
+        gap = self.compliance.displacement(sigma, out=self.grid.empty())
         gap -= self.height
         gap -= self.grid.mean(gap[sigma > 0])
         residual = self.residual(gap + self.height, sigma)
@@ -120,7 +120,7 @@ class FreeContact(Contact):
 
     def reference_level(self, u: Field, sigma: Field) -> float:
         """Level c of the undeformed surface: <sigma u> = <sigma C sigma> + c p."""
-        response = self.free.displacement(sigma, out=self.grid.empty())
+        response = self.compliance.displacement(sigma, out=self.grid.empty())
         np.subtract(u, response, out=response)
         work, load = self.grid.total(np.array([np.vdot(sigma, response), sigma.sum()]))
         return float(work / load)
@@ -131,7 +131,8 @@ class FreeContact(Contact):
         Its stress K h is that of full contact, which is not defined for a map with borders.
         """
         grid = doubled_grid(self.grid)
-        k = self.free.elastomer.stiffness(grid.wavenumber(), grid.length) / self.free.unit
+        elastomer, unit = self.compliance.elastomer, self.compliance.unit
+        k = elastomer.stiffness(grid.wavenumber(), grid.length) / unit
         mask = None if self.may_touch is None else mirror(self.may_touch)
         return Contact(grid, mirror(self.height), k, self.pressure, mask)
 
@@ -143,7 +144,7 @@ class FreeContact(Contact):
             grid=grid,
             height=self.grid.average(self.height, grid),
             may_touch=self._coarse_mask(grid),
-            free=replace(self.free, grid=grid),
+            compliance=replace(self.compliance, grid=grid),
         )
 
 
@@ -167,14 +168,14 @@ def build_free_scene(
     grid = create_grid(replace(surface.grid(points, points_y), threads=threads), ranks)
     doubled, mirrored, void = _mirrored(surface, grid, ranks)
     scene = reduce_scene(doubled, mirrored, elastomer)
-    free = FreeElasticity(elastomer, grid, scene.delta_sigma / scene.h_std)
+    compliance = FreeCompliance(elastomer, grid, scene.delta_sigma / scene.h_std)
     return replace(
         scene,
         grid=grid,
         height=_on_map(doubled, scene.height, grid),
         stiffness=np.empty(0),
         may_touch=touchable(void, grid),
-        contact_type=partial(FreeContact, free=free),
+        contact_type=partial(FreeContact, compliance=compliance),
     )
 
 

@@ -68,21 +68,21 @@ def border_contact(grid: Grid, mask: Mask) -> float:
     return float(touching / outermost)
 
 
-class Quantity(NamedTuple):
+class MainObservable(NamedTuple):
     """An observable that has error estimates."""
 
     heading: str
     """Symbol in tables, over the reduced unit."""
-    scale: str = ""
+    unit_column: str = ""
     """Column of the reduced unit in a study; empty for a pure number."""
-    si: str = ""
+    si_unit: str = ""
     """SI unit."""
 
 
-QUANTITIES = {
-    "a_r": Quantity("a_r"),
-    "sigma_p": Quantity("sigma_p / Delta_sigma", "delta_sigma", "Pa"),
-    "u_g": Quantity("u_g / h_std", "h_std", "m"),
+MAIN_OBSERVABLES = {
+    "a_r": MainObservable("a_r"),
+    "sigma_p": MainObservable("sigma_p / Delta_sigma", "delta_sigma", "Pa"),
+    "u_g": MainObservable("u_g / h_std", "h_std", "m"),
 }
 """The observables that have error estimates, by their names."""
 

@@ -26,7 +26,7 @@ The last bin has the larger patches, too: on a cell that is longer along y."""
 
 
 @dataclass(frozen=True)
-class Regions:
+class ConnectedRegions:
     """The connected regions of a mask."""
 
     sizes: Integers
@@ -35,17 +35,17 @@ class Regions:
     """Whether any of the regions percolates, for each axis of the mask."""
 
 
-def contact_patches(touching: Mask, *, periodic: bool = True) -> Regions:
+def contact_patches(touching: Mask, *, periodic: bool = True) -> ConnectedRegions:
     """Contact patches: eight neighbours, two in a line contact."""
-    return regions(touching, corners=True, periodic=periodic)
+    return connected_regions(touching, corners=True, periodic=periodic)
 
 
-def open_gap(touching: Mask, *, periodic: bool = True) -> Regions:
+def open_gap(touching: Mask, *, periodic: bool = True) -> ConnectedRegions:
     """Connected regions of the gap: four neighbours, two in a line contact."""
-    return regions(~touching, corners=False, periodic=periodic)
+    return connected_regions(~touching, corners=False, periodic=periodic)
 
 
-def regions(mask: Mask, *, corners: bool, periodic: bool = True) -> Regions:
+def connected_regions(mask: Mask, *, corners: bool, periodic: bool = True) -> ConnectedRegions:
     """Connected regions of a mask, with neighbours at corners if `corners`.
 
     In a mask that is not periodic, a region percolates if it reaches two opposite borders.
@@ -53,7 +53,9 @@ def regions(mask: Mask, *, corners: bool, periodic: bool = True) -> Regions:
     structure = ndimage.generate_binary_structure(mask.ndim, mask.ndim if corners else 1)
     labels, count = ndimage.label(mask, structure)
     if not periodic:
-        return Regions(np.bincount(labels.ravel(), minlength=count + 1)[1:], _spans(labels))
+        return ConnectedRegions(
+            np.bincount(labels.ravel(), minlength=count + 1)[1:], _spans(labels)
+        )
     tree = _Tree(list(range(count + 1)), np.zeros((count + 1, mask.ndim), dtype=np.int64))
     percolates = np.zeros(mask.ndim, dtype=bool)
     for one, other, *cells in _bonds(labels, structure):
@@ -62,7 +64,7 @@ def regions(mask: Mask, *, corners: bool, periodic: bool = True) -> Regions:
     points = np.zeros(count + 1, dtype=np.int64)
     np.add.at(points, roots, np.bincount(labels.ravel(), minlength=count + 1))
     sizes = points[1:]  # the first is the number of points outside the mask
-    return Regions(sizes[sizes > 0], percolates)
+    return ConnectedRegions(sizes[sizes > 0], percolates)
 
 
 def _spans(labels: Integers) -> Mask:

@@ -48,7 +48,7 @@ def contact_stress(contact: Contact, touching: Mask, copies: int = 1) -> Contact
     if not np.any(touching):
         return ContactStress(np.nan, np.nan)
     grid, square = contact.grid, 0.0
-    field = contact.elasticity(contact.height, grid.empty())
+    field = contact.apply_stiffness(contact.height, grid.empty())
     known = np.count_nonzero(touching) >= MIN_POINTS * copies
     deviation = float(field[touching].std()) if known else np.nan
     for axis in range(grid.dimension):  # the components of the quadrature
@@ -112,7 +112,7 @@ def bearing(contact: Contact) -> Bearing:
     Fractions over which sigma_h is constant, as under a flat punch on springs, are left out.
     """
     height = contact.height
-    stress = contact.elasticity(contact.height, contact.grid.empty())
+    stress = contact.apply_stiffness(contact.height, contact.grid.empty())
     stress -= stress.flat[height.argmax()]  # so that a flat top has no stress
     low, high = float(height.min()), float(height.max())
     sums = np.zeros((3, HEIGHT_BINS))

@@ -21,8 +21,8 @@ from gfmd_cli.analysis.wording import (
     in_si,
     largest,
     pressure_text,
-    quantity,
     shown,
+    with_unit,
 )
 from gfmd_cli.grid.arrays import Field, Mask
 from gfmd_cli.maps.pictures import block_sums
@@ -57,15 +57,15 @@ ROWS = 256  # of fields, or of pixels of a map, that are in memory at a time
 class Scale(NamedTuple):
     """Units of a quantity on axes."""
 
-    si: str
+    si_unit: str
     column: str
     """Column of a row that holds the reduced unit."""
     symbol: str
 
     def axis(self, row: Row, largest_value: float, label: str) -> tuple[float, str]:
         """A divisor for values up to `largest_value`, and the label with its unit."""
-        if in_si(row, self.si):
-            divisor, unit = scaled(largest_value, self.si)
+        if in_si(row, self.si_unit):
+            divisor, unit = scaled(largest_value, self.si_unit)
             return divisor, f"{label} ({unit})"
         return float(row[self.column]), f"{label} / {self.symbol}"
 
@@ -276,7 +276,7 @@ def _most_loaded(study: StudyFile, row: Row) -> Profile | None:
     position = (np.arange(size) / size + row["x_first"]) * float(row["length"])
     inside = " away from the borders" if 0 < border <= top < loads.size - border else ""
     y_of_row = (top / loads.size + row["x_first"]) * float(row["length_y"])
-    at = quantity(y_of_row, "m") if in_si(row, "m") else f"{y_of_row / row['length']:.2f} L"
+    at = with_unit(y_of_row, "m") if in_si(row, "m") else f"{y_of_row / row['length']:.2f} L"
     place = f" through the row{inside} that carries most load (y = {at})"
     return Profile(values, position, "x", row, place)
 

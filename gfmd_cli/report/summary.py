@@ -9,9 +9,9 @@ from gfmd_cli.analysis.export import csv_text
 from gfmd_cli.analysis.selection import grouped
 from gfmd_cli.analysis.table import known
 from gfmd_cli.analysis.tables import warnings_in
-from gfmd_cli.analysis.wording import grid_size, in_si, pretty, quantity, span
+from gfmd_cli.analysis.wording import grid_size, in_si, pretty, span, with_unit
 from gfmd_cli.physics.error_estimates import Verdict
-from gfmd_cli.physics.observables import QUANTITIES
+from gfmd_cli.physics.observables import MAIN_OBSERVABLES
 from gfmd_cli.report.data import ReportData
 from gfmd_cli.study.column import Row
 from gfmd_cli.units import count, duration
@@ -65,7 +65,7 @@ def key_numbers(data: ReportData) -> list[KeyNumber]:
     rows = data.solved
     tolerances = f"natural residual, tolerance: {_span(rows, 'tolerance')}"
     seconds = sum(value for value in _column(rows, "seconds") if math.isfinite(value))
-    time = quantity(seconds, "s") if seconds < SECONDS else duration(seconds)
+    time = with_unit(seconds, "s") if seconds < SECONDS else duration(seconds)
     return [
         *_quantities(data),
         *_theory_numbers(data),
@@ -106,13 +106,15 @@ def _unit_note(rows: list[Row]) -> str:
 
 def _scaled(data: ReportData, title: str, name: str) -> KeyNumber:
     """A quantity that has a reduced unit; in SI units where those mean something."""
-    symbol, scale, unit = QUANTITIES[name]
+    symbol, unit_column, unit = MAIN_OBSERVABLES[name]
     rows = data.comparison.records
     reduced, where = _column(rows, f"{name}_best"), _continuum_note(rows, name)
     if not data.in_si(unit):
         return title, span(reduced), f"{symbol}{where}"
     values = [
-        value * row[scale] for value, row in zip(reduced, rows, strict=True) if in_si(row, unit)
+        value * row[unit_column]
+        for value, row in zip(reduced, rows, strict=True)
+        if in_si(row, unit)
     ]
     note = f"{symbol} = {span(reduced)}{where}{_si_note(rows, unit)}"
     return title, span(values, unit), note
@@ -191,7 +193,7 @@ def _unresolved(data: ReportData) -> list[str]:
     """A line for each quantity that has no continuum value though one was asked for."""
     counts = Counter(
         (name, row[f"{name}_verdict"])
-        for name in QUANTITIES
+        for name in MAIN_OBSERVABLES
         for row in data.solved
         if row[f"{name}_verdict"] in UNRESOLVED
     )

@@ -64,7 +64,7 @@ class ConstrainedCG(Solver):
             force[pressed] = 0.0  # [1]
             self._update_direction(contact.grid, state, force, pressed)  # [2]
             state.force, force = force, state.force
-            contact.elasticity(state.direction, out=response)
+            contact.apply_stiffness(state.direction, out=response)
             state.transforms += 2
             length = self._length(contact, state, response)  # [3]
             np.multiply(state.direction, length, out=force)

@@ -9,12 +9,12 @@ from gfmd_cli.grid.arrays import Mask
 from gfmd_cli.physics.contact import Contact
 
 ContactState: TypeAlias = NDArray[np.int8]
-"""FREE, TENSE or PRESSED for each grid point."""
+"""FREE, TENSILE or PRESSED for each grid point."""
 
-FREE, TENSE, PRESSED = 0, 1, 2
+FREE, TENSILE, PRESSED = 0, 1, 2
 """A point is not in contact; in contact, but under tension; or in contact under pressure.
 
-A kernel holds the points whose state is at least its `threshold`: PRESSED, or TENSE where points
+A kernel holds the points whose state is at least its `threshold`: PRESSED, or TENSILE where points
 under tension are not released.
 """
 

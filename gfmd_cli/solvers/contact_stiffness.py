@@ -86,7 +86,7 @@ def _stiffness(contact: Contact, touching: Mask) -> float:
 @_stiffness.register
 def _of_free_contact(contact: FreeContact, touching: Mask) -> float:
     """<sigma_1> / <1 - C sigma_1> by the same method; NaN if the iteration does not converge."""
-    free = contact.free
+    compliance = contact.compliance
     rest = np.ones(contact.grid.shape)  # 1 - C sigma_1
     force, z, response = (contact.grid.empty() for _ in range(3))
     direction = np.zeros_like(rest)
@@ -95,13 +95,13 @@ def _of_free_contact(contact: FreeContact, touching: Mask) -> float:
         np.multiply(rest, touching, out=force)
         if float(np.vdot(force, force)) <= TOLERANCE**2 * np.count_nonzero(touching):
             return total / float(rest[~touching].sum())
-        free.approximate_stress(force, out=z)
+        compliance.approximate_stress(force, out=z)
         z *= touching
         z_change = -length * float(np.vdot(z, response))  # z times the change of the force
         direction *= polak_ribiere(z_change, slope)
         direction += z
         slope = float(np.vdot(z, force))
-        free.displacement(direction, out=response)
+        compliance.displacement(direction, out=response)
         length = float(np.vdot(direction, force)) / float(np.vdot(direction, response))
         rest -= length * response
         total += length * float(direction.sum())

@@ -201,15 +201,15 @@ class _DirectSolve:
         return misclassified, self.contact.as_residual(squares)
 
     def exchange(self, misclassified: Mask, limit: int) -> None:
-        """Change whether these points are in contact; up to `limit` of those entered join.
+        """Change whether these points are in contact; up to `limit` of the penetrating join.
 
         They are the deepest.
         """
-        entered = np.nonzero(misclassified & ~self.touching)
-        if entered[0].size > limit:
-            gap = self.values[entered] - self.obstacle[entered]
+        penetrating = np.nonzero(misclassified & ~self.touching)
+        if penetrating[0].size > limit:
+            gap = self.values[penetrating] - self.obstacle[penetrating]
             shallow = np.argpartition(gap, limit)[limit:]
-            misclassified[tuple(places[shallow] for places in entered)] = False
+            misclassified[tuple(places[shallow] for places in penetrating)] = False
         self.touching ^= misclassified
 
     def equilibrium(self, points: Points) -> tuple[Field, Field]:

@@ -6,7 +6,7 @@ step of the method, with the numbers beside the code lines:
 
 [1] Set the level such that the mean gap in contact is zero. Choose the points whose stress may
     change: those in contact and, by proportioning (Dostal, SIAM J. Optim. 7, 871, 1997), those
-    without stress where indenter and elastomer overlap.
+    without stress that penetrate the indenter.
 [2] Precondition the gap of these points by the stiffness K, and subtract the mean.
 [3] Compute a Polak-Ribiere+ direction d, zero where it would make a stress of zero tensile.
 [4] Project the move of length l on the constraints: s -> max(s + l d - shift, 0), where the shift
@@ -37,7 +37,7 @@ from gfmd_cli.solvers.projected_move import (
     projected,
 )
 
-MAX_OVERLAP_RATIO = 0.3  # of the rms gap on overlapping points to that in contact; as in `pcg`
+MAX_PENETRATION = 0.3  # of the rms gap on penetrating points to that in contact; as in `pcg`
 
 
 @dataclass(kw_only=True)
@@ -93,8 +93,8 @@ class Dual(Solver):
 
     def refresh(self, contact: Any, state: Any) -> None:
         """Compute the gap, u and the residual from the stress."""
-        contact.free.displacement(state.sigma, out=state.gap)
-        state.transforms += contact.free.transforms
+        contact.compliance.displacement(state.sigma, out=state.gap)
+        state.transforms += contact.compliance.transforms
         state.gap -= contact.height
         state.exact = True
         self._assess(contact, state)
@@ -112,8 +112,8 @@ class Dual(Solver):
             yield state
             chosen = _chosen(contact, state)  # [1]
             force = np.where(chosen, state.gap, 0.0)
-            contact.free.approximate_stress(force, out=z)  # [2]
-            state.transforms += contact.free.preconditioner_transforms
+            contact.compliance.approximate_stress(force, out=z)  # [2]
+            state.transforms += contact.compliance.preconditioner_transforms
             z -= contact.grid.mean(z[chosen])
             z[~chosen] = 0.0
             beta = polak_ribiere(contact.grid.dot(z, state.change), state.slope)
@@ -132,10 +132,11 @@ class Dual(Solver):
 
     def _advance(self, contact: FreeContact, state: DualState, chosen: Mask) -> bool:
         """Move such that the energy falls; false if no length does that, because of rounding."""
-        free, grid, stress, change = contact.free, contact.grid, state.sigma, state.change
+        compliance, grid = contact.compliance, contact.grid
+        stress, change = state.sigma, state.change
         if state.length == 0:
-            free.displacement(state.direction, out=change)
-            state.transforms += free.transforms
+            compliance.displacement(state.direction, out=change)
+            state.transforms += compliance.transforms
             curvature = grid.dot(state.direction, change)
             descent = -grid.dot(state.direction, state.gap)
             state.length = descent / curvature if curvature > 0 else 1.0
@@ -151,8 +152,8 @@ class Dual(Solver):
         else:
             change[...] = 0.0
             return False
-        free.displacement(move, out=change)
-        state.transforms += free.transforms
+        compliance.displacement(move, out=change)
+        state.transforms += compliance.transforms
         curvature = grid.dot(move, change)
         best = fall / curvature if curvature > 0 else 1.0
         length = best * state.length
@@ -179,8 +180,8 @@ def _new_state(u: Field, stress: Field, gap: Field) -> DualState:
 def _chosen(contact: FreeContact, state: DualState) -> Mask:
     """The points whose stress may change."""
     touching: Mask = state.sigma > 0
-    overlapping: Mask = contact.clear_untouchable(~touching & (state.gap < 0))
-    inside, outside = state.gap[touching], state.gap[overlapping]
-    if contact.grid.dot(outside, outside) > MAX_OVERLAP_RATIO**2 * contact.grid.dot(inside, inside):
-        touching |= overlapping
+    penetrating: Mask = contact.clear_untouchable(~touching & (state.gap < 0))
+    inside, outside = state.gap[touching], state.gap[penetrating]
+    if contact.grid.dot(outside, outside) > MAX_PENETRATION**2 * contact.grid.dot(inside, inside):
+        touching |= penetrating
     return touching

@@ -11,7 +11,7 @@ TILE_WIDTH = SIDE * BATCH_SIZE  # numbers between points of neighbouring tiles
 
 
 @kernel
-def mark_entered(w, level, h, used, entered, sums, a, b):
+def mark_penetrated(w, level, h, used, penetrated, sums, a, b):
     """Mark the tiles that are not used in which w - level is below h somewhere.
 
     `sums` receives the sum of w^2 of each row.
@@ -28,7 +28,7 @@ def mark_entered(w, level, h, used, entered, sums, a, b):
             for j in range(SIDE * block, SIDE * block + SIDE):
                 somewhere |= below[j]
             if somewhere and not used[i // SIDE, block]:
-                entered[i // SIDE, block] = True
+                penetrated[i // SIDE, block] = True
 
 
 @kernel

@@ -149,31 +149,32 @@ class LocalSolve:
         return result, displacement
 
     def evaluate(self, displacement: Field, tolerance: float) -> Evaluation:
-        """Compare C s at all points with the indenter, and add the tiles in which it is entered.
+        """Compare C s at all points with the indenter, and add the tiles in which it is penetrated.
 
         The tolerance is that of the residual of the start.
         """
         gap = self.tiles.take(displacement) - self.obstacle
         level = float(gap[self.s > 0].mean())
-        squares = self.add_entered(displacement, level)
+        squares = self.add_penetrated(displacement, level)
         gap = self.tiles.take(displacement) - self.obstacle - level
         gap_of_start, start_residual = self.lay(gap, tolerance)
         rounding = 0.0
         if displacement.dtype == np.float32:
-            rounding = self.contact.noise(displacement.dtype) * self.contact.as_residual(squares)
+            relative = self.contact.stress_rounding(displacement.dtype)
+            rounding = relative * self.contact.as_residual(squares)
         return Evaluation(level, gap_of_start, self.residual(gap, self.s), start_residual, rounding)
 
-    def add_entered(self, displacement: Field, level: float) -> float:
+    def add_penetrated(self, displacement: Field, level: float) -> float:
         """Add tiles in which C s - level is below h, and those around.
 
         Returns the sum of the squares of C s over the grid.
         """
-        entered = np.zeros(self.tiles.used.shape, dtype=np.bool_)
-        fields = (displacement, level, self.contact.obstacle, self.tiles.used, entered)
-        squares = float(self.grid.rows.sums(1, kernels.mark_entered, *fields)[0])
-        if entered.any():
+        penetrated = np.zeros(self.tiles.used.shape, dtype=np.bool_)
+        fields = (displacement, level, self.contact.obstacle, self.tiles.used, penetrated)
+        squares = float(self.grid.rows.sums(1, kernels.mark_penetrated, *fields)[0])
+        if penetrated.any():
             is_periodic = self.tiles.is_periodic
-            around = maximum_filter(entered, 3, mode="wrap" if is_periodic else "constant")
+            around = maximum_filter(penetrated, 3, mode="wrap" if is_periodic else "constant")
             tiles = Tiles(self.tiles.used | around, is_periodic=is_periodic)
             s = np.zeros((tiles.count, SIDE * SIDE))
             s[self.tiles.used[tiles.used]] = self.s

@@ -204,8 +204,8 @@ class FreeSolve(LocalSolve):
         """C s at all points, always in double precision."""
         values = self.grid.empty()
         self.tiles.put(self.s, values)
-        self.transforms += self.contact.free.transforms
-        return self.contact.free.displacement(values, out=values)
+        self.transforms += self.contact.compliance.transforms
+        return self.contact.compliance.displacement(values, out=values)
 
     def start(self, tolerance: float) -> Start:
         """The stress, and the displacement that it causes."""

@@ -181,8 +181,8 @@ def _direct_solution(
     return state
 
 
-def levels(shape: Shape, sides: tuple[float, ...]) -> list[Shape]:
-    """Grids of a cell from coarse to fine, each with half the points (made even) of the next.
+def nested_shapes(shape: Shape, sides: tuple[float, ...]) -> list[Shape]:
+    """Shapes of grids from coarse to fine, each with half the points (made even) of the next.
 
     Pixels that are far from square are first coarsened along their shorter side only.
     """
@@ -202,10 +202,10 @@ def _coarser(shape: Shape, sides: tuple[float, ...]) -> Shape:
     )
 
 
-def grids_of(solver: Solver, grid: Grid) -> list[Shape]:
+def solved_shapes(solver: Solver, grid: Grid) -> list[Shape]:
     """Shapes of the grids on which a solver solves, from coarse to fine."""
     nested = solver.iterative and solver.nested
-    return levels(grid.whole_shape, grid.sides) if nested else [grid.whole_shape]
+    return nested_shapes(grid.whole_shape, grid.sides) if nested else [grid.whole_shape]
 
 
 def _grids(contact: Contact, solver: Solver, resume: Resume | None) -> list[Contact]:
@@ -214,7 +214,7 @@ def _grids(contact: Contact, solver: Solver, resume: Resume | None) -> list[Cont
     Where a small contact will be solved on tiles, heights at every other point of a grid predict
     the contact as well as filtered ones (docs/solvers.md), and need no transform.
     """
-    chain = grids_of(solver, contact.grid)
+    chain = solved_shapes(solver, contact.grid)
     if resume is not None:
         chain = chain[chain.index(resume.shape) :]
     contacts = [contact]

@@ -34,7 +34,7 @@ from gfmd_cli.grid.arrays import Field, SingleField
 from gfmd_cli.physics.contact import Contact
 from gfmd_cli.physics.observables import contact_points
 from gfmd_cli.solvers import pcg_kernels as kernels
-from gfmd_cli.solvers.contact_state import PRESSED, TENSE, refined
+from gfmd_cli.solvers.contact_state import PRESSED, TENSILE, refined
 from gfmd_cli.solvers.loop import Solver, Start, State
 from gfmd_cli.solvers.multigrid import largest_growth
 from gfmd_cli.solvers.preconditioners import Preconditioner, create, select
@@ -172,7 +172,7 @@ class _Run:
         self.grid = grid = contact.grid
         self.rows = grid.rows
         self.moves = contact.grid_of_moves
-        self.noise = contact.noise(self.moves.real)
+        self.stress_rounding = contact.stress_rounding(self.moves.real)
         self.h, self.padded = grid.as_rows(contact.obstacle), grid.as_rows(self.moves.padded)
         self.u, self.sigma = grid.as_rows(state.u), grid.as_rows(state.sigma)
         self.direction, self.change = map(grid.as_rows, (state.direction, state.change))
@@ -201,7 +201,7 @@ class _Run:
         """
         state, step = self.state, self.state.step
         release = state.tension > MAX_TENSION_RATIO**2 * state.free
-        self.threshold = PRESSED if release else TENSE
+        self.threshold = PRESSED if release else TENSILE
         if step < state.select_at:
             return
         state.select_at = max(step + MIN_SELECTION_INTERVAL, int(SELECTION_GROWTH * step))
@@ -267,7 +267,7 @@ class _Run:
         way = (self.direction, length, fraction, self.padded, self.change)
         self.assess(self.rows.sums(3, kernels.advance, *fields, *way, self.own_state))  # [5]
         state.exact = False
-        rounding = self.noise * fraction * self.contact.as_residual(square)
+        rounding = self.stress_rounding * fraction * self.contact.as_residual(square)
         state.rounding = hypot(state.rounding, rounding)  # of the moves so far
 
     def update_direction(self, beta: float, *, is_kept: bool = False) -> Field:

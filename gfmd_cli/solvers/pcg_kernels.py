@@ -4,7 +4,7 @@
 """
 
 from gfmd_cli.grid.compilation import kernel, part_of_kernel
-from gfmd_cli.solvers.contact_state import FREE, PRESSED, TENSE
+from gfmd_cli.solvers.contact_state import FREE, PRESSED, TENSILE
 
 
 @part_of_kernel
@@ -16,7 +16,7 @@ def _assess_point(gap, s):
         smaller * smaller,
         square if free else 0.0,
         square if tense and not free else 0.0,
-        FREE if free else (TENSE if tense else PRESSED),
+        FREE if free else (TENSILE if tense else PRESSED),
     )
 
 

@@ -10,7 +10,7 @@ beside the code lines:
 [4] Compute the displacement due to the direction.
 [5] Compute the step length.
 [6] Set negative pressures to zero.
-[7] Increase the pressure at points without pressure where indenter and elastomer overlap; restart.
+[7] Increase the pressure at points without pressure that penetrate the indenter; restart.
 [8] Scale to the mean pressure.
 
 The method is suitable for n of about 1 and below. For larger n, step [7] presses on points without
@@ -104,9 +104,9 @@ class PolonskyKeer(Solver):
             s -= length * t
             cut = grid.any(s < 0)
             np.maximum(s, 0.0, out=s)  # [6]
-            overlap = contact.clear_untouchable((s == 0) & (gap < 0))
-            s[overlap] -= length * gap[overlap]  # [7]
-            state.conjugate = not grid.any(overlap)
+            penetrating = contact.clear_untouchable((s == 0) & (gap < 0))
+            s[penetrating] -= length * gap[penetrating]  # [7]
+            state.conjugate = not grid.any(penetrating)
             scale = contact.pressure / grid.mean(s)
             s *= scale  # [8]
             state.transforms += 2

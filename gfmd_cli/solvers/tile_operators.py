@@ -133,12 +133,12 @@ class FreeOperators(TileOperators):
     first_node: ClassVar[int] = SPLINE_ORDER // 2 - 1  # splines beyond the border overlap tiles
 
     def __init__(self, contact: FreeContact) -> None:
-        grid, free, near = contact.grid, contact.free, (SIDE + 1, SIDE + 1)
-        pixel = free.elastomer.free_compliance(near, grid.spacings) * free.unit
+        grid, compliance, near = contact.grid, contact.compliance, (SIDE + 1, SIDE + 1)
+        pixel = compliance.elastomer.free_compliance(near, grid.spacings) * compliance.unit
         short_ranged = pixel - _smooth_part(contact, near, 1)
         sides = [MIN_CELL_POINTS * spacing for spacing in grid.spacings]
         cell = Grid(MIN_CELL_POINTS, points_y=MIN_CELL_POINTS, length=sides[1], length_y=sides[0])
-        k = free.elastomer.stiffness(cell.wavenumber(), grid.length) / free.unit
+        k = compliance.elastomer.stiffness(cell.wavenumber(), grid.length) / compliance.unit
         shape = tuple(points // COARSENING + SPLINE_ORDER - 1 for points in grid.shape)
         padded = padded_shape(shape, 2.0)
         transform = PaddedTransform(shape, padded, "single", len(grid.rows.parts))
@@ -181,12 +181,12 @@ def _alpha(grid: Grid) -> float:
 
 def _smooth_part(contact: FreeContact, shape: Shape, step: int) -> Field:
     """The smooth part of the displacement by unit pressure on a pixel, at every so many points."""
-    grid, elastomer = contact.grid, contact.free.elastomer
+    grid, elastomer = contact.grid, contact.compliance.elastomer
     assert elastomer.exponent is not None
     y, x = (step * h * np.arange(m) for m, h in zip(shape, grid.spacings, strict=True))
     kernel = smooth_part(elastomer.exponent, _alpha(grid), np.hypot(y[:, None], x))
     k_n = float(elastomer.stiffness(np.ones(1))[0])
-    return kernel * (contact.free.unit / k_n * float(np.prod(grid.spacings)))
+    return kernel * (contact.compliance.unit / k_n * float(np.prod(grid.spacings)))
 
 
 def _nodes_of_tile() -> Integers:

@@ -129,7 +129,7 @@ class Check:
             tables["places"][name] = [places for _, places in entries]
         if load := tables.get("load"):
             groups = _keys_of("load", sweeps)
-            places = [_places_of({load.quantity: i}, groups) for i in range(len(load.listed()))]
+            places = [_places_of({load.key: i}, groups) for i in range(len(load.listed()))]
             tables["places"]["load"] = places
         if "accuracy" not in data:
             tables["accuracy"] = None
@@ -204,10 +204,10 @@ class Check:
                 'with grid.points = "auto" the points along y follow from the sides; give '
                 "surface.length_y",
             )
-        if auto and load is not None and models.LOADS[load.quantity].searched:
+        if auto and load is not None and models.LOADS[load.key].searched:
             self.add(
                 "grid.points",
-                f'"auto" needs load.p_star or load.pressure; load.{load.quantity} is searched on '
+                f'"auto" needs load.p_star or load.pressure; load.{load.key} is searched on '
                 "a given grid",
             )
         given = [grid.points for grid in tables.get("grid", [])]
@@ -275,7 +275,7 @@ def _problem(name: str, places: dict[str, int], detail: Any) -> tuple[str, str]:
         key += f"[{part}]" if isinstance(part, int) else f".{part}"
         key += f"[{places[part]}]" if part in places else ""
     if detail["type"] == "extra_forbidden":
-        within = models.Ladder if len(path) > 1 else model
+        within = models.GeometricSequence if len(path) > 1 else model
         known = [field.alias or field_name for field_name, field in within.model_fields.items()]
         text = _unknown(str(path[-1]), known, "key")
         owners = [kind for kind, other in kinds.items() if path[-1] in other.model_fields]

@@ -21,9 +21,9 @@ from gfmd_cli.physics.surfaces import Surface
 from gfmd_cli.solvers.auto import AnySolver
 from gfmd_cli.spec_table import Positive, SpecTable
 
-MAX_VALUES = 100_000  # of one list or ladder; upper limit, guards against typing errors
+MAX_VALUES = 100_000  # of one list or sequence; upper limit, guards against typing errors
 MAX_DECADES = 300.0  # of which a power of ten does not overflow
-LADDER_ROUNDINGS = 8  # of a power of ten, by which a value of the ladder may lie above `to`
+SEQUENCE_ROUNDINGS = 8  # of a power of ten, by which a value of the sequence may lie above `to`
 NO_STUDY = {".csv", ".nc", ".vti", ".html", ".json", ".toml"}
 """Suffixes that a study cannot have: those of other files that commands write or read."""
 SWEPT = ("surface", "elastomer", "grid", "solver")
@@ -98,7 +98,7 @@ def with_boundary(
     return surface.within(boundary), grid.model_copy(update={"boundary": boundary})
 
 
-class Ladder(SpecTable):
+class GeometricSequence(SpecTable):
     """The values from * 10^(i / per_decade), i = 0, 1, ..., up to `to`.
 
     The ratio of neighbouring values is fixed: a larger `to` adds values and changes no others.
@@ -123,7 +123,7 @@ class Ladder(SpecTable):
         """The values, rising."""
         steps = int(self._decades * self.per_decade) + 1  # one may be missed by rounding
         values = [self._value(step / self.per_decade) for step in range(steps + 1)]
-        rounding = LADDER_ROUNDINGS * np.finfo(float).eps * (1 + np.log(10) * self._decades)
+        rounding = SEQUENCE_ROUNDINGS * np.finfo(float).eps * (1 + np.log(10) * self._decades)
         return [value for value in values if value / self.to - 1 <= rounding]
 
     @property
@@ -138,9 +138,9 @@ class Ladder(SpecTable):
 
 
 def _shape(value: Any) -> str:
-    """The form in which values are given: a number, a list or a ladder."""
-    if isinstance(value, dict | Ladder):
-        return "ladder"
+    """The form in which values are given: a number, a list or a sequence."""
+    if isinstance(value, dict | GeometricSequence):
+        return "sequence"
     return "list" if isinstance(value, list) else "number"
 
 
@@ -150,7 +150,9 @@ OneOrMany = (
     | Annotated[list[T], Key(min_length=1, max_length=MAX_VALUES), Tag("list")]
 )
 Share = Annotated[float, Key(gt=0, lt=1)]
-Values = Annotated[OneOrMany[Positive] | Annotated[Ladder, Tag("ladder")], Discriminator(_shape)]
+Values = Annotated[
+    OneOrMany[Positive] | Annotated[GeometricSequence, Tag("sequence")], Discriminator(_shape)
+]
 Areas = Annotated[
     OneOrMany[Share],
     Discriminator(
@@ -159,7 +161,7 @@ Areas = Annotated[
         custom_error_message="must be a number or a list of numbers, not a geometric sequence",
     ),
 ]
-SHAPES = ("number", "list", "ladder", "count", "word")
+SHAPES = ("number", "list", "sequence", "count", "word")
 """Tags of the unions above, which no message should name."""
 
 
@@ -184,9 +186,9 @@ LOADS = {
 """The quantities by their keys in [load]."""
 
 
-def load_text(quantity: str, value: float) -> str:
+def load_text(key: str, value: float) -> str:
     """A load with its symbol."""
-    return f"{LOADS[quantity].symbol}={value:.6g}"
+    return f"{LOADS[key].symbol}={value:.6g}"
 
 
 class LoadTable(SpecTable):
@@ -227,14 +229,14 @@ class LoadTable(SpecTable):
         return self
 
     @property
-    def quantity(self) -> str:
-        """The quantity that is prescribed."""
+    def key(self) -> str:
+        """The key of the quantity that is prescribed."""
         return next(name for name in LOADS if getattr(self, name) is not None)
 
     def listed(self) -> list[float]:
         """The prescribed values in the given order."""
-        values = getattr(self, self.quantity)
-        if isinstance(values, Ladder):
+        values = getattr(self, self.key)
+        if isinstance(values, GeometricSequence):
             return values.values()
         return list(values) if isinstance(values, list) else [values]
 
@@ -380,8 +382,8 @@ class Spec(SpecTable):
                 if choice.file is not None:
                     dumped["path"] = choice.file.name
                     dumped["sha256"] = file_digest(choice.file)
-        data["load"] = {self.load.quantity: self.load.values()}
-        if LOADS[self.load.quantity].searched:
+        data["load"] = {self.load.key: self.load.values()}
+        if LOADS[self.load.key].searched:
             data["load"]["tolerance"] = self.load.tolerance
         return data
 

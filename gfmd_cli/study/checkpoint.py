@@ -25,8 +25,8 @@ from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.grid.ranks import Ranks, is_root, on_root, shared_errors
 from gfmd_cli.physics.contact import Contact
 from gfmd_cli.solvers.loop import Solver, State
-from gfmd_cli.solvers.nested_grids import Resume, grids_of
-from gfmd_cli.study.notes import Notes
+from gfmd_cli.solvers.nested_grids import Resume, solved_shapes
+from gfmd_cli.study.history import TaskHistory
 from gfmd_cli.study.pointer import Part, Scalars, Slot, read_pointer, write_pointer
 from gfmd_cli.study.unfinished_work import delete_checkpoint, set_aside
 
@@ -113,8 +113,8 @@ class Checkpoint:
                 return SavedProgress(slot.shape[-1], slot.state.step, slot.state.residual, when)
         return None
 
-    def save(self, contact: Contact, state: State, notes: Notes) -> None:
-        """Write the state and the notes that go with it. Raises SpaceError."""
+    def save(self, contact: Contact, state: State, history: TaskHistory) -> None:
+        """Write the state and the history that goes with it. Raises SpaceError."""
         if not self.mine:
             return
         fields = {name: v for name, v in vars(state).items() if isinstance(v, np.ndarray)}
@@ -126,7 +126,7 @@ class Checkpoint:
             name=name,
             parts=parts,
             shape=contact.grid.whole_shape,
-            notes=deepcopy(notes),
+            history=deepcopy(history),
             state=Scalars(**{name: v for name, v in vars(state).items() if name not in fields}),
             fields={name: field.dtype.str for name, field in fields.items()},
         )
@@ -154,7 +154,7 @@ class Checkpoint:
         if not self.slots:
             return None
         slot, size = self.slots[0], 1 if self.ranks is None else self.ranks.size
-        if slot.shape not in grids_of(solver, grid):
+        if slot.shape not in solved_shapes(solver, grid):
             raise StudyError(f"{self.folder}: the saved state is of another grid")
         level = grid if slot.shape == grid.whole_shape else grid.coarser(slot.shape)
         if not slot.holds(solver.state_type, level.shape) or slot.state.step > solver.max_steps:
@@ -168,9 +168,9 @@ class Checkpoint:
         return Resume(slot.shape, state, len(slot.parts) != size)
 
     @property
-    def notes(self) -> Notes:
-        """The notes of the saved state, empty ones without a state."""
-        return deepcopy(self.slots[0].notes) if self.slots else Notes()
+    def history(self) -> TaskHistory:
+        """The history of the saved state, an empty one without a state."""
+        return deepcopy(self.slots[0].history) if self.slots else TaskHistory()
 
     def remove(self) -> None:
         """Forget the state: the task is done."""

@@ -6,22 +6,22 @@ from gfmd_cli.grid.arrays import Field
 from gfmd_cli.physics.observables import (
     LINEAR_EDGES,
     LOGARITHMIC_EDGES,
-    QUANTITIES,
+    MAIN_OBSERVABLES,
     geometric_middles,
 )
 from gfmd_cli.physics.patches import AREA_EDGES
 from gfmd_cli.study.column import Column
-from gfmd_cli.study.observables import OBSERVABLES
+from gfmd_cli.study.observables import OPTIONAL_OBSERVABLES
 from gfmd_cli.study.parameters import parameters
 
 LAYOUT = 4
 """Raised whenever a reader of the old layout would misread the new one."""
-BENCH = "bench_layout"
+BENCH_ATTRIBUTE = "bench_layout"
 """Attribute that a bench has in the place of a study's `layout`."""
 
 
 STATUS = Column("status", "converged, or the reason why not", "", str)
-CONTRACT = (
+MAIN_COLUMNS = (
     Column("surface", "kind of surface, and the keys that the spec gives", "", str),
     Column("seed", "seed of the random phases; -1 if the surface has none", kind=int),
     Column("elastomer", "kind of elastomer, and the keys that the spec gives", "", str),
@@ -43,7 +43,7 @@ CONTRACT = (
 )
 """The columns that every `export` begins with, in this order."""
 
-DETAILS = (
+DETAIL_COLUMNS = (
     Column("pressure", "nominal pressure", "Pa"),
     Column("delta_sigma", "unit of pressure: rms stress in full contact", "Pa"),
     Column("h_std", "root-mean-square height", "m"),
@@ -91,7 +91,7 @@ DETAILS = (
     Column("grid", "auto if the program chose the grid by the requested accuracy", "", str),
     *(
         column
-        for name in QUANTITIES
+        for name in MAIN_OBSERVABLES
         for column in (
             Column(f"{name}_continuum", "estimate of the continuum value"),
             Column(f"{name}_continuum_error", "its estimated error"),
@@ -115,21 +115,21 @@ DETAILS = (
         "factor by which the shortest waves that a map resolves (2 points or lateral_period_limit) "
         "and those of up to twice this length increase Delta_sigma; NaN for other surfaces",
     ),
-    *(observable.column for observable in OBSERVABLES),
+    *(observable.column for observable in OPTIONAL_OBSERVABLES),
 )
-PARAMETERS = parameters((*CONTRACT, *DETAILS))
+PARAMETERS = parameters((*MAIN_COLUMNS, *DETAIL_COLUMNS))
 """Every key of [surface], [elastomer], [grid] and [solver], with its column."""
 PARAMETER_COLUMNS = tuple(
-    each.column for each in PARAMETERS if each.column not in (*CONTRACT, *DETAILS)
+    each.column for each in PARAMETERS if each.column not in (*MAIN_COLUMNS, *DETAIL_COLUMNS)
 )
 """Columns of parameters after those above; a study file has those that some task has."""
-COLUMNS = (*CONTRACT, *DETAILS, *PARAMETER_COLUMNS)
+COLUMNS = (*MAIN_COLUMNS, *DETAIL_COLUMNS, *PARAMETER_COLUMNS)
 
 
 class HistogramColumn(NamedTuple):
     """A histogram of each task: densities in bins that all tasks share."""
 
-    option: str
+    output_key: str
     """Key of [output] that turns it on."""
     name: str
     axis: str
@@ -165,7 +165,7 @@ HISTOGRAMS = (
     HistogramColumn("gap_distribution", "pr_gap_log", "gap_log", *_GAP, LOGARITHMIC_EDGES),
     HistogramColumn("patches", "pr_patch_area", "patch_area", *_AREA, AREA_EDGES),
 )
-BINS = {histogram.name: histogram for histogram in HISTOGRAMS}
+HISTOGRAMS_BY_NAME = {histogram.name: histogram for histogram in HISTOGRAMS}
 WEIGHTS = {
     "histogram": (
         Column("pr_zero", "weight of the delta function of Pr(sigma) at zero"),
@@ -226,7 +226,7 @@ AUTOCORRELATIONS = (
 class TaskGroup(NamedTuple):
     """Arrays that each task has of its own, in the group /NAME/TASK of a study."""
 
-    option: str
+    output_key: str
     """Key of [output] that turns them on."""
     name: str
     columns: tuple[Column, ...]

@@ -11,10 +11,10 @@ from gfmd_cli.physics.contact import Contact
 from gfmd_cli.solvers.loop import State
 from gfmd_cli.solvers.nested_grids import Resume
 from gfmd_cli.status import Status
-from gfmd_cli.study.notes import Notes
+from gfmd_cli.study.history import TaskHistory
 
 
-class Progress(NamedTuple):
+class ProgressEvent(NamedTuple):
     """Progress event of one task."""
 
     task: int
@@ -39,10 +39,10 @@ class Progress(NamedTuple):
     """Reduced pressure of the solve."""
 
 
-Report = Callable[[Progress], None]
+Report = Callable[[ProgressEvent], None]
 
 
-def ignore(progress: Progress) -> None:
+def ignore(progress: ProgressEvent) -> None:
     """A report that does nothing."""
 
 
@@ -81,14 +81,14 @@ class SolveContext:
     def warn(self, *messages: str, task: int = -1, label: str = "") -> None:
         """Report warnings, by default on the whole run."""
         for message in messages:
-            self.report(Progress(task, "warning", label, message=message))
+            self.report(ProgressEvent(task, "warning", label, message=message))
 
 
 class Watcher:
     """Follows the solve of one task; this one does nothing."""
 
     def __init__(self) -> None:
-        self.notes = Notes()
+        self.history = TaskHistory()
         """What was solved before the present grid, to be saved with its state."""
 
     def saved_state(self, contact: Contact) -> Resume | None:

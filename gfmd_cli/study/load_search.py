@@ -26,13 +26,13 @@ from gfmd_cli.grid.arrays import Field
 from gfmd_cli.physics.approach import estimated_pressures, touching_displacement
 from gfmd_cli.physics.contact import PRESSURE_RANGE, Scene
 from gfmd_cli.physics.error_estimates import with_shift
-from gfmd_cli.physics.observables import QUANTITIES
+from gfmd_cli.physics.observables import MAIN_OBSERVABLES
 from gfmd_cli.physics.persson import Persson
 from gfmd_cli.spec.models import LOADS
 from gfmd_cli.status import Status
 from gfmd_cli.study.context import SolveContext, Watcher
+from gfmd_cli.study.history import Trial
 from gfmd_cli.study.measure import measured
-from gfmd_cli.study.notes import Trial
 from gfmd_cli.study.plausibility import loaded_value
 from gfmd_cli.study.pressure_search import MIN_SLOPE, PressureSearch
 from gfmd_cli.study.refinement import TaskSolution, has_coarser_grid, solve_on_grids, task_scene
@@ -72,11 +72,11 @@ def solve_at_load(task: Task, context: SolveContext, watcher: Watcher) -> TaskSo
     Raises InputError for a mean gap or displacement that no pressure has, and an area below one
     grid point.
     """
-    if not LOADS[task.quantity].searched:
+    if not LOADS[task.load_key].searched:
         return solve_on_grids(task, context, watcher)
     solves = _Solves(task, context, watcher)
     grids = _grids(task)
-    has_error = task.accuracy is not None and LOADS[task.quantity].searched in QUANTITIES
+    has_error = task.accuracy is not None and LOADS[task.load_key].searched in MAIN_OBSERVABLES
     measured_on = grids[max(len(grids) - 2, 0)] if has_error else 0
     searches: list[PressureSearch] = []
     slopes = _Slopes()
@@ -96,8 +96,8 @@ def solve_at_load(task: Task, context: SolveContext, watcher: Watcher) -> TaskSo
             slopes = solves.slopes(search)
         searches.append(search)
     solved = solves.latest(search.nearest)
-    work = sum(trial.work for trial in solves.trials)
-    solved.solution.transforms = work / solved.contact.grid.size
+    cost = sum(trial.cost for trial in solves.trials)
+    solved.solution.transforms = cost / solved.contact.grid.size
     _check_known(task, solved)
     if has_error:
         _with_errors_at_load(task, solved, slopes if search.succeeded else _Slopes())
@@ -116,11 +116,11 @@ class _Slopes(NamedTuple):
 
 
 class _Solves:
-    """The solves of a search: one per trial, stored as notes of the task."""
+    """The solves of a search: one per trial, stored in the history of the task."""
 
     def __init__(self, task: Task, context: SolveContext, watcher: Watcher) -> None:
         self.task, self.context, self.watcher = task, context, watcher
-        self.trials = watcher.notes.trials
+        self.trials = watcher.history.trials
         self._latest: TaskSolution | None = None
 
     def latest(self, trial: Trial | None = None) -> TaskSolution:
@@ -145,7 +145,7 @@ class _Solves:
     def slopes(self, search: PressureSearch) -> _Slopes:
         """The slopes at the root of a search, by trials at two pressures beside it."""
         scene, root = search.scene, search.nearest
-        jump = JUMP[scene.grid.dimension] * search.quantum
+        jump = JUMP[scene.grid.dimension] * search.point_area
         ratio = min(max(NEIGHBOURS[0], 1 + JUMPS * jump / self.task.load), NEIGHBOURS[1])
         made = sum(trial.is_neighbour for trial in self.trials)
         for step in (ratio, 1 / ratio)[made:]:
@@ -162,15 +162,15 @@ class _Solves:
         if solved.solution.status is Status.DIVERGED:
             return False
         row = measured(self.task, solved)
-        value = loaded_value(self.task.quantity, row)
-        work = solved.solution.transforms * solved.contact.grid.size
+        value = loaded_value(self.task.load_key, row)
+        cost = solved.solution.transforms * solved.contact.grid.size
         units, observables = _units(solved.scene), dict[str, float]()
         if solved.solution.status.is_accurate:
-            values = row | {LOADS[self.task.quantity].searched: value}
-            observables = {name: float(values[name]) * units[name] for name in QUANTITIES}
+            values = row | {LOADS[self.task.load_key].searched: value}
+            observables = {name: float(values[name]) * units[name] for name in MAIN_OBSERVABLES}
         is_touching = row["a_r"] > 0
         self.trials.append(
-            Trial(points, pressure, value, work, observables, is_neighbour, is_touching)
+            Trial(points, pressure, value, cost, observables, is_neighbour, is_touching)
         )
         return True
 
@@ -204,7 +204,7 @@ def _with_errors_at_load(task: Task, solved: TaskSolution, slopes: _Slopes) -> N
     error of ln p is the logarithm of the value over the value less its error, over the exponent.
     The other quantities change over it, at most in proportion to p.
     """
-    name, units = LOADS[task.quantity].searched, _units(solved.scene)
+    name, units = LOADS[task.load_key].searched, _units(solved.scene)
     estimates, estimate = solved.estimates, solved.estimates[name]
     least = min((chord[name] for chord in slopes.chords), default=0.0) / units[name]
     slope = least - slopes.uncertain
@@ -221,18 +221,18 @@ def _with_errors_at_load(task: Task, solved: TaskSolution, slopes: _Slopes) -> N
 
 def _check_known(task: Task, solved: TaskSolution) -> None:
     """Raise InputError where [accuracy] asks for a continuum value that cannot be given."""
-    estimate = solved.estimates.get(LOADS[task.quantity].searched)
+    estimate = solved.estimates.get(LOADS[task.load_key].searched)
     if estimate is None or isfinite(estimate.continuum):
         return
     if solved.scene.has_voids:
         reason = 'no continuum value is known with surface.missing = "void"; '
     elif estimate.is_final:
-        reason = f"{LOADS[task.quantity].words} {estimate.verdict.explanation}; "
+        reason = f"{LOADS[task.load_key].words} {estimate.verdict.explanation}; "
     else:
         reason = f"the continuum value is not known on a grid with {task.points} points along x; "
         reason += "try a finer grid, or "
     remedy = "leave out [accuracy] for the value on the grid"
-    raise InputError(f"load.{task.quantity}: {reason}{remedy}")
+    raise InputError(f"load.{task.load_key}: {reason}{remedy}")
 
 
 def _grids(task: Task) -> list[int]:
@@ -252,11 +252,11 @@ def _at(task: Task, points: int, pressure: float) -> Task:
     if points != task.points:
         tolerance = max(solver.tolerance, COARSE_RESIDUAL)
         solver = solver.model_copy(update={"tolerance": tolerance})
-        accuracy = accuracy if task.quantity == "contact_area" else None  # others hardly change
+        accuracy = accuracy if task.load_key == "contact_area" else None  # others hardly change
     return replace(
         task,
         solver=solver,
-        quantity="pressure",
+        load_key="pressure",
         load=pressure,
         points=points,
         points_y=task.points_y_on(points),
@@ -266,17 +266,17 @@ def _at(task: Task, points: int, pressure: float) -> Task:
 
 def _out_of_reach(task: Task, scene: Scene) -> str:
     """Why no pressure gives the load on a grid; "" if one does."""
-    if task.quantity == "contact_area" and task.load * scene.grid.size < 1:
+    if task.load_key == "contact_area" and task.load * scene.grid.size < 1:
         return (
             f"load.contact_area: {task.load:g} is less than one of the {scene.grid.size} "
             "points of the grid"
         )
-    if task.quantity == "mean_gap" and task.load >= scene.highest:
+    if task.load_key == "mean_gap" and task.load >= scene.highest:
         return (
             f"load.mean_gap = {task.load:g} h_std is not reached: without load the mean gap is "
             f"{scene.highest:g} h_std"
         )
-    if task.quantity == "displacement":
+    if task.load_key == "displacement":
         smallest = touching_displacement(scene, task.surface.peak())
         if task.load <= smallest:
             return (
@@ -301,10 +301,10 @@ def _start(task: Task, scene: Scene, searches: list[PressureSearch]) -> tuple[fl
 
 def _pressures(task: Task, scene: Scene, loads: Field) -> Field:
     """The pressures [Pa] of some loads in Persson theory."""
-    if task.quantity == "displacement":
+    if task.load_key == "displacement":
         return estimated_pressures(scene, task.surface.peak(), task.elastomer, loads)
     theory = Persson(scene.shells)
-    if task.quantity == "contact_area":
+    if task.load_key == "contact_area":
         return theory.pressure_at_area(loads)
     return theory.pressure_at_gap(np.clip(loads * scene.h_std, *theory.gap_range))
 
@@ -315,6 +315,6 @@ def _shift(task: Task, searches: list[PressureSearch]) -> float:
     The error of a contact area on the grid is about proportional to the spacing. Continuum values,
     mean gaps and displacements hardly depend on the grid.
     """
-    if task.quantity != "contact_area" or task.accuracy is not None or len(searches) < 2:
+    if task.load_key != "contact_area" or task.accuracy is not None or len(searches) < 2:
         return 0.0
     return AREA_RATIO * (searches[-1].result - searches[-2].result)

@@ -21,7 +21,7 @@ from gfmd_cli.physics.surface_spectrum import map_spectrum, short_wave_factor
 from gfmd_cli.spec.models import SWEPT, OutputTable
 from gfmd_cli.study.column import Row
 from gfmd_cli.study.columns import FIELDS, PARAMETERS, PR_LINEAR, PR_LOGARITHMIC, empty_row
-from gfmd_cli.study.observables import OBSERVABLES, SolvedContact
+from gfmd_cli.study.observables import OPTIONAL_OBSERVABLES, SolvedContact
 from gfmd_cli.study.plausibility import SEPARATOR, warnings_of
 from gfmd_cli.study.provenance import gfmd_version
 from gfmd_cli.study.refinement import TaskSolution
@@ -51,7 +51,7 @@ def planned(task: Task) -> Row:
         "length_y": surface.sides[0] if surface.dimension == 2 else np.nan,
         "n": np.nan if elastomer.exponent is None else elastomer.exponent,
         "grid": "auto" if task.auto else "given",
-        "load": task.quantity,
+        "load": task.load_key,
         "load_value": task.load,
     }
 
@@ -61,7 +61,7 @@ def measured(task: Task, solved: TaskSolution) -> Row:
     scene, contact, solution = solved.scene, solved.contact, solved.solution
     u, sigma = solution.u, solution.sigma
     pressure = contact.pressure * scene.delta_sigma
-    if task.quantity == "pressure":  # exactly as prescribed, so that contacts can be grouped by it
+    if task.load_key == "pressure":  # exactly as prescribed, so that contacts can be grouped by it
         pressure = task.load
     return {
         **asdict(solved.observables),
@@ -156,8 +156,8 @@ def optional_columns(output: OutputTable, solved: SolvedContact) -> Row:
         pr = gap_histogram(solved.contact, solved.u)
         row |= {"pr_gap": pr.linear, "pr_gap_log": pr.logarithmic}
         row |= {"pr_gap_zero": pr.zero, "pr_gap_beyond": pr.beyond, "pr_gap_below": pr.below}
-    for option, column, measure, *_ in OBSERVABLES:
-        if getattr(output, option) and (value := measure(solved)) is not None:
+    for output_key, column, measure, *_ in OPTIONAL_OBSERVABLES:
+        if getattr(output, output_key) and (value := measure(solved)) is not None:
             row[column.name] = column.kind(value)
     if output.patches:
         row["pr_patch_area"] = area_distribution(solved.patch_areas)

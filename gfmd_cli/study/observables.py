@@ -62,16 +62,16 @@ class ReducedUnit(NamedTuple):
 
     symbol: str
     """In symbols, such as "L^2"."""
-    si: str
+    si_unit: str
     """The SI unit, such as "m^2"."""
     value: Callable[[Mapping[str, Any]], float]
     """Its value in SI units, from a row of a study."""
 
 
-class Observable(NamedTuple):
+class OptionalObservable(NamedTuple):
     """One scalar of a solved contact."""
 
-    option: str
+    output_key: str
     """The key of [output] that turns it on."""
     column: Column
     measure: Callable[[SolvedContact], float | None]
@@ -92,8 +92,8 @@ STIFFNESS = ReducedUnit(
     "(Delta_sigma / h_std)", "Pa/m", lambda row: float(row["delta_sigma"] / row["h_std"])
 )
 
-OBSERVABLES = (
-    Observable(
+OPTIONAL_OBSERVABLES = (
+    OptionalObservable(
         "true_contact",
         Column(
             "deviation_c",
@@ -102,12 +102,12 @@ OBSERVABLES = (
         ),
         lambda solved: solved.full_contact_stress.deviation,
     ),
-    Observable(
+    OptionalObservable(
         "true_contact",
         Column("quadrature_c", "rms of i (q / |q|) k h over the true contact / Delta_sigma"),
         lambda solved: solved.full_contact_stress.quadrature,
     ),
-    Observable(
+    OptionalObservable(
         "true_contact",
         Column(
             "deviation_bearing",
@@ -116,13 +116,13 @@ OBSERVABLES = (
         ),
         lambda solved: float(bearing(solved.mirrored).delta_sigma_c(solved.contact.pressure)),
     ),
-    Observable(
+    OptionalObservable(
         "patches",
         Column("patches", "number of contact patches (8-connected points)", kind=int),
         lambda solved: solved.patch_areas.size,
         "patches",
     ),
-    Observable(
+    OptionalObservable(
         "patches",
         Column("patch_area_mean", "mean area of a patch / L^2; in a line contact, / L"),
         lambda solved: solved.patch_areas.mean() if solved.patch_areas.size else None,
@@ -130,7 +130,7 @@ OBSERVABLES = (
         PATCH_AREA,
         PATCH_LENGTH,
     ),
-    Observable(
+    OptionalObservable(
         "patches",
         Column("patch_area_largest", "area of the largest patch, in the same units"),
         lambda solved: solved.patch_areas.max() if solved.patch_areas.size else None,
@@ -138,7 +138,7 @@ OBSERVABLES = (
         PATCH_AREA,
         PATCH_LENGTH,
     ),
-    Observable(
+    OptionalObservable(
         "stiffness",
         Column(
             "stiffness",
@@ -149,7 +149,7 @@ OBSERVABLES = (
         "-dp/du_g",
         STIFFNESS,
     ),
-    Observable(
+    OptionalObservable(
         "percolation",
         Column(
             "percolates_x",
@@ -161,7 +161,7 @@ OBSERVABLES = (
         "percolates\nalong x",
         is_flag=True,
     ),
-    Observable(
+    OptionalObservable(
         "percolation",
         Column("percolates_y", "the same along y; blank for a line contact", kind=int),
         lambda solved: solved.percolates[1] if len(solved.percolates) > 1 else None,

@@ -44,9 +44,9 @@ SEPARATOR = " | "
 """Between the warnings of one contact in a column of text."""
 
 
-def loaded_value(quantity: str, results: Mapping[str, Any]) -> float:
+def loaded_value(load_key: str, results: Mapping[str, Any]) -> float:
     """The value that a load prescribes: in the continuum if it is known, else on the grid."""
-    name = LOADS[quantity].searched
+    name = LOADS[load_key].searched
     continuum = float(results.get(f"{name}_continuum", inf))
     return continuum if isfinite(continuum) else float(results[name])
 
@@ -158,7 +158,7 @@ def _compressed(task: Task, h_std: float, displacement: float) -> Iterator[str]:
         yield (
             f"the indenter has moved by {displacement:.3g} m since first touch, but "
             f"elastomer.thickness is {largest:g} m: linear elasticity does not hold for "
-            f"such compressions; check load.{task.quantity}, elastomer.E_star and thickness"
+            f"such compressions; check load.{task.load_key}, elastomer.E_star and thickness"
         )
 
 
@@ -198,8 +198,8 @@ def _unit_of_grid(task: Task, scene: Scene) -> Iterator[str]:
 
 def _load_in_jump(task: Task, status: Status, results: Mapping[str, Any]) -> Iterator[str]:
     """A warning if a contact area is farther than the tolerance from the load."""
-    if task.quantity == "contact_area" and status.is_accurate:
-        value = loaded_value(task.quantity, results)
+    if task.load_key == "contact_area" and status.is_accurate:
+        value = loaded_value(task.load_key, results)
         if not abs(value - task.load) <= task.load_tolerance * task.load:
             load = f"load.contact_area = {task.load:g}"
             yield f"{load} lies in a jump; this is the nearest contact found"
@@ -219,7 +219,7 @@ def _missed_accuracy(task: Task, solved: TaskSolution) -> Iterator[str]:
         yield f"[accuracy] is met on no grid: {name} {solved.estimates[name].verdict.explanation}"
     if others := [name for name in columns if name not in final]:
         remedy = "more points"
-        if not LOADS[task.quantity].searched:
+        if not LOADS[task.load_key].searched:
             remedy = 'grid.points = "auto"; accuracy.max_points limits it'
         yield (
             f"the errors of {', '.join(others)} are larger than [accuracy] requests, or unknown: "
@@ -247,10 +247,10 @@ def _contact_at_border(task: Task, solved: TaskSolution) -> Iterator[str]:
 
 def _doubtful_unit(task: Task, solved: TaskSolution) -> str:
     """A warning about a load that has probably another unit than was meant, else ""."""
-    scene, key, load = solved.scene, f"load.{task.quantity}", task.load
+    scene, key, load = solved.scene, f"load.{task.load_key}", task.load
     low, high = REDUCED_PRESSURES
     unit = f"p* = 1 is {scene.delta_sigma:.3g} Pa here"
-    if task.quantity == "mean_gap":
+    if task.load_key == "mean_gap":
         near_zero, small = SMALL_GAPS
         is_possible = small <= load / scene.h_std <= scene.highest
         if load < near_zero or (load < small and is_possible):
@@ -258,16 +258,16 @@ def _doubtful_unit(task: Task, solved: TaskSolution) -> str:
                 f"{key} is relative to the rms height, {scene.h_std:.3g} m here, and {load:g} is "
                 "next to full contact: is it a length in m? Divide it by the rms height"
             )
-    if task.quantity == "displacement" and load < SMALL_DISPLACEMENT * scene.h_std:
+    if task.load_key == "displacement" and load < SMALL_DISPLACEMENT * scene.h_std:
         return (
             f"{key} = {load:g} m is {load / scene.h_std:.1g} of the rms height, "
             f"{scene.h_std:.3g} m: are heights and lengths in m?"
         )
     if solved.observables.a_r == 1 and solved.contact.pressure > high:
-        if task.quantity == "p_star":
+        if task.load_key == "p_star":
             return f"{key} is far above full contact; {unit}: load.pressure takes Pa"
         return f"{key} is far above full contact; {unit}: are moduli, heights and load in Pa and m?"
     is_light = task.surface.rough and solved.contact.pressure < low
-    if task.quantity == "pressure" and is_light and solved.observables.a_r < 1:
+    if task.load_key == "pressure" and is_light and solved.observables.a_r < 1:
         return f"{key} gives hardly any contact; {unit}: are moduli, heights and load in Pa and m?"
     return ""

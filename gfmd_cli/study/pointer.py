@@ -19,12 +19,12 @@ from gfmd_cli.files.checksums import check_seal, sealed
 from gfmd_cli.files.regular import open_regular
 from gfmd_cli.grid import arrays
 from gfmd_cli.solvers.loop import State
-from gfmd_cli.study.notes import Notes, PointCount
+from gfmd_cli.study.history import PointCount, TaskHistory
 
-LAYOUT = 5
+LAYOUT = 6
 """Raised whenever a state of the old layout must not be resumed."""
 MAX_BYTES = 2**24
-"""Size of a pointer: 100 bytes for each of at most 65536 processes, and the notes."""
+"""Size of a pointer: 100 bytes for each of at most 65536 processes, and the history."""
 MAX_PARTS = 65536
 PRECISIONS = {arrays.Field: "<f8", arrays.SingleField: "<f4"}
 """Types of the values of an array, by its annotation in the class of a state."""
@@ -66,7 +66,7 @@ class Slot(_Checked):
     """Points along y and x of the whole grid."""
     fields: Annotated[dict[Name, str], Field(min_length=1, max_length=64)]
     state: Scalars
-    notes: Notes
+    history: TaskHistory
 
     @model_validator(mode="after")
     def _check_parts(self) -> Self:

@@ -11,7 +11,7 @@ from multiprocessing.connection import Connection, Pipe, wait
 from pathlib import Path
 
 from gfmd_cli.status import Status
-from gfmd_cli.study.context import Progress, SolveContext, WorkerOptions
+from gfmd_cli.study.context import ProgressEvent, SolveContext, WorkerOptions
 from gfmd_cli.study.resources import available_memory, gib, out_of_memory_kills
 from gfmd_cli.study.signals import blocked_signals, interruptible
 from gfmd_cli.study.tasks import Task
@@ -146,7 +146,7 @@ class Pool:
         except (EOFError, OSError):
             self._remove_dead(worker)
             return
-        if isinstance(message, Progress):
+        if isinstance(message, ProgressEvent):
             self.report(message)
             return
         if message == Status.INTERRUPTED:
@@ -208,7 +208,7 @@ class Pool:
             message = f"task {task.index} ({task.label}): {reason}"
             self.context.warn(message, task=task.index, label=task.label)
         if status is not None:
-            self.report(Progress(task.index, "end", task.label, status=status, message=reason))
+            self.report(ProgressEvent(task.index, "end", task.label, status=status, message=reason))
 
 
 def ending(status: int) -> str:

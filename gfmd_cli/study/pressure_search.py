@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gfmd_cli.physics.contact import PRESSURE_RANGE, Scene
-from gfmd_cli.study.notes import Trial
+from gfmd_cli.study.history import Trial
 from gfmd_cli.study.tasks import Task
 
 # Choices, which change the number of trials (one to three on a grid) and hardly the result:
@@ -52,14 +52,14 @@ class PressureSearch:
 
     def __init__(self, task: Task, scene: Scene, first: float, slope: float) -> None:
         self.task, self.scene, self._slope = task, scene, slope
-        is_area, is_last = task.quantity == "contact_area", scene.grid.points == task.points
-        self.sign = -1 if task.quantity == "mean_gap" else 1
-        self.quantum = 1 / scene.grid.size if is_area else 0.0
+        is_area, is_last = task.load_key == "contact_area", scene.grid.points == task.points
+        self.sign = -1 if task.load_key == "mean_gap" else 1
+        self.point_area = 1 / scene.grid.size if is_area else 0.0
         tolerance = task.load_tolerance if is_last else COARSE_DISTANCE
-        self.tolerance = max(tolerance, 0.5 * self.quantum / task.load)  # no area is nearer
+        self.tolerance = max(tolerance, 0.5 * self.point_area / task.load)  # no area is nearer
         apart = (1.0 if is_area else SMOOTH) * task.solver.tolerance
-        apart = max(apart, ENTERING * self.quantum / task.load, ROUNDING)
-        self.resolution = apart if is_last else COARSE_DISTANCE
+        apart = max(apart, ENTERING * self.point_area / task.load, ROUNDING)
+        self.min_interval = apart if is_last else COARSE_DISTANCE
         self.lowest = max(PRESSURE_RANGE[0], RESOLVED * _stiffest(task, scene) if is_area else 0.0)
         """Reduced pressure above which the load is sought."""
         self.first = max(first, self.lowest * scene.delta_sigma)
@@ -72,7 +72,7 @@ class PressureSearch:
         Where a pressure has no contact, rounding has taken it: the trial is left out, and lower
         pressures are not tried. The continuum value of an area can be 0 although points touch.
         """
-        if self.quantum > 0 and trial.value == 0 and not trial.is_touching:
+        if self.point_area > 0 and trial.value == 0 and not trial.is_touching:
             self.lowest = max(self.lowest, trial.pressure / self.scene.delta_sigma)
             self.first = trial.pressure * exp(MAX_STEP)  # where no trial has had contact yet
             return
@@ -100,7 +100,7 @@ class PressureSearch:
 
     def _are_same(self, one: _Point, other: _Point) -> bool:
         """Whether two trials have the same value: for an area, the same number of points."""
-        return abs(one.trial.value - other.trial.value) <= 0.5 * self.quantum
+        return abs(one.trial.value - other.trial.value) <= 0.5 * self.point_area
 
     @property
     def result(self) -> float:
@@ -119,14 +119,14 @@ class PressureSearch:
     def succeeded(self) -> bool:
         """Whether the nearest trial is within the tolerance, or the contact area jumps there."""
         within = self._deviation(self.points[0]) <= self.tolerance
-        return within or (self.quantum > 0 and self.is_exhausted)
+        return within or (self.point_area > 0 and self.is_exhausted)
 
     @property
     def is_exhausted(self) -> bool:
         """Whether no pressure between comes nearer, or the solver cannot tell them apart."""
         low, high = self._enclosure()
         step = abs(high.trial.value - low.trial.value)
-        return high.x - low.x < self.resolution or step < 1.5 * self.quantum
+        return high.x - low.x < self.min_interval or step < 1.5 * self.point_area
 
     def _enclosure(self) -> tuple[_Point, _Point]:
         """The highest pressure known to be too low, and the lowest known to be too high."""
@@ -145,8 +145,8 @@ class PressureSearch:
         if not is_enclosed:
             start = low if start.y < 0 else high
         plateau = max(abs(at.x - start.x) for at in self.points if self._are_same(at, start))
-        x = self._secant(start, max(plateau, self.resolution))  # its length is about 0 at a jump
-        margin = 0.5 * self.resolution
+        x = self._secant(start, max(plateau, self.min_interval))  # its length is about 0 at a jump
+        margin = 0.5 * self.min_interval
         is_inside = low.x + margin < x < high.x - margin
         if is_enclosed and (not is_inside or len(self.points) % 5 == 4):
             x = 0.5 * (low.x + high.x)

@@ -251,7 +251,7 @@ def open_study(source: Path, opened: BinaryIO | None = None) -> Iterator[StudyFi
 
 
 def _check_layout(path: Path, file: Any) -> None:
-    if layout.BENCH in file.attrs:
+    if layout.BENCH_ATTRIBUTE in file.attrs:
         raise StudyError(f"{path}: a bench file, not a study; `gfmd bench` prints its table")
     if NETCDF in file.attrs:
         raise StudyError(f"{path}: a netCDF file, as of `gfmd export`, not the study (NAME.h5)")

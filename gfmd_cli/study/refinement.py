@@ -30,7 +30,7 @@ from gfmd_cli.solvers.nested_grids import Solution, solve_contact
 from gfmd_cli.status import Status
 from gfmd_cli.study.context import SolveContext, Watcher, WorkerOptions
 from gfmd_cli.study.forecast import MIN_FIRST_POINTS
-from gfmd_cli.study.notes import SolvedGrid
+from gfmd_cli.study.history import SolvedGrid
 from gfmd_cli.study.tasks import Task
 
 MAX_UNKNOWN_GRIDS = 3  # after which an unknown error stays so: two give all that is calibrated
@@ -108,13 +108,13 @@ os.register_at_fork(after_in_child=forget_scenes)
 def solve_on_grids(task: Task, context: SolveContext, watcher: Watcher) -> TaskSolution:
     """Solve a task on its grid, or on finer and finer grids until the errors are as requested.
 
-    The notes of the watcher name the grids that an earlier run solved. Raises InputError, and what
-    the watcher raises.
+    The history of the watcher names the grids that an earlier run solved. Raises InputError,
+    and what the watcher raises.
     """
     sizes = _sizes(task)
-    grids = watcher.notes.grids
-    if [grid.points for grid in grids] != sizes[:-1][: len(grids)]:  # the notes are of other sizes
-        grids = watcher.notes.grids = []
+    grids = watcher.history.grids
+    if [grid.points for grid in grids] != sizes[:-1][: len(grids)]:  # the history is of other sizes
+        grids = watcher.history.grids = []
     solved: TaskSolution | None = None
     for points in sizes[len(grids) :]:
         solved = None  # frees its memory, which is needed now
@@ -130,9 +130,9 @@ def solve_on_grids(task: Task, context: SolveContext, watcher: Watcher) -> TaskS
         if points == sizes[-1] or not on_root(context.ranks, continues):
             break
     assert solved is not None
-    watcher.notes.grids = []
+    watcher.history.grids = []
     solution = solved.solution
-    solution.transforms = sum(grid.work for grid in grids) / scene.grid.size
+    solution.transforms = sum(grid.cost for grid in grids) / scene.grid.size
     if task.auto and solution.status.is_converged and inaccurate_columns(task, solved):
         solution.status = Status.ACCURACY_NOT_REACHED
     return solved
@@ -223,7 +223,7 @@ def _solved_grid(solved: TaskSolution) -> SolvedGrid:
         sigma_p=measured.sigma_p * scene.delta_sigma,
         u_g=measured.u_g * scene.h_std,
         perimeter=measured.perimeter,
-        work=solved.solution.transforms * scene.grid.size,
+        cost=solved.solution.transforms * scene.grid.size,
         border=None if contact.is_periodic else border_share(contact, solved.solution),
     )
 
@@ -239,14 +239,14 @@ def _estimates(task: Task, solved: TaskSolution, grids: list[SolvedGrid]) -> dic
     scene = solved.scene
     if not solved.solution.residual < MAX_RESIDUAL or scene.has_voids:  # voids have no law
         return unknown()
-    resolution, length = scene.grid.resolution, scene.grid.length
-    if discretisation_error.has_step(task.elastomer, resolution, length):
+    effective_points, length = scene.grid.effective_points, scene.grid.length
+    if discretisation_error.has_step(task.elastomer, effective_points, length):
         return unknown()
     is_rough = task.surface.rough
     copies = scene.texture.copies if is_rough and task.boundary == "periodic" else 1
     levels = [
         GridValues(
-            grid.points * (resolution / scene.grid.points),
+            grid.points * (effective_points / scene.grid.points),
             grid.a_r,
             grid.sigma_p / scene.delta_sigma,
             grid.u_g / scene.h_std,
@@ -256,8 +256,8 @@ def _estimates(task: Task, solved: TaskSolution, grids: list[SolvedGrid]) -> dic
         )
         for grid in grids
     ]
-    exponent = discretisation_error.local_exponent(task.elastomer, resolution, length)
-    area_exponent = discretisation_error.excess_exponent(task.elastomer, resolution, length)
+    exponent = discretisation_error.local_exponent(task.elastomer, effective_points, length)
+    area_exponent = discretisation_error.excess_exponent(task.elastomer, effective_points, length)
     # a grid in full contact shows only a part of these waves
     has_hidden_waves = solved.observables.a_r == 1 and scene.texture.has_nyquist_waves
     return discretisation_error.estimate(
@@ -267,7 +267,7 @@ def _estimates(task: Task, solved: TaskSolution, grids: list[SolvedGrid]) -> dic
         area_exponent,
         same_waves=task.surface.band_limited and not has_hidden_waves,
         stepped=task.surface.stepped,
-        tip=discretisation_error.Tip(task.surface.tip_exponent, scene.grid.dimension),
+        tip=discretisation_error.IndenterTip(task.surface.tip_exponent, scene.grid.dimension),
         full_contact_errors=_full_contact_errors(task, solved),
     )
 

@@ -10,12 +10,12 @@ from time import monotonic
 
 from gfmd_cli.errors import InputError, Interrupted, SpaceError
 from gfmd_cli.files.file_cache import forget_files
-from gfmd_cli.files.locks import AS_LONG_AS_NEEDED, Waits
+from gfmd_cli.files.locks import AS_LONG_AS_NEEDED, WaitOptions
 from gfmd_cli.grid import plans
 from gfmd_cli.grid.ranks import Ranks, is_root, on_root, shared_errors
 from gfmd_cli.spec.models import Spec
 from gfmd_cli.status import Status
-from gfmd_cli.study.context import Progress, Report, SolveContext, WorkerOptions
+from gfmd_cli.study.context import ProgressEvent, Report, SolveContext, WorkerOptions
 from gfmd_cli.study.plausibility import unit_of_grids
 from gfmd_cli.study.pool import Pool, Worker
 from gfmd_cli.study.refinement import forget_scenes
@@ -86,8 +86,9 @@ def run_study(
     forget_scenes()
     stop = Event()
     end = monotonic() + (inf if options.max_seconds is None else options.max_seconds)
-    waits = Waits(stop, end) if ranks is None else AS_LONG_AS_NEEDED  # ranks stop together
-    study = Study(path, waits)
+    # ranks stop together
+    wait_options = WaitOptions(stop, end) if ranks is None else AS_LONG_AS_NEEDED
+    study = Study(path, wait_options)
     tasks = plan(spec)
     if ranks is not None and (names := spec.output.on_request()):
         raise InputError(f"output.{names[0]}: takes whole grids; run it without mpiexec")
@@ -112,7 +113,7 @@ def run_study(
         seconds = max(options.max_seconds / 2, options.max_seconds - seconds_to_stop(pending, jobs))
         last = monotonic() + seconds
 
-    def watch(progress: Progress) -> None:
+    def watch(progress: ProgressEvent) -> None:
         report(remaining.with_time_left(progress))
         if is_root(ranks):
             _keep_failure(progress, tasks, study.parts)
@@ -124,7 +125,9 @@ def run_study(
         damaged = on_root(ranks, lambda: work.enter_context(study.work(tasks)))
         work.callback(forget_scenes)  # their plans are those of this run
         work.callback(plans.plan_with, None)
-        unusable = plans.plan_with(study.parts, estimated=options.reproducible, waits=waits)
+        unusable = plans.plan_with(
+            study.parts, estimated=options.reproducible, wait_options=wait_options
+        )
         context.warn(*(f"{study.path}: the old one is kept as {new}" for new in moved))
         context.warn(*damaged, *filter(None, [unusable, unit_of_grids(pending)]))
         try:
@@ -146,7 +149,7 @@ def run_study(
     return counts + solved
 
 
-def _keep_failure(progress: Progress, tasks: list[Task], parts: Path) -> None:
+def _keep_failure(progress: ProgressEvent, tasks: list[Task], parts: Path) -> None:
     """Keep the error of a task that has failed, until the task starts again."""
     if progress.event == "start":
         forget_failure(parts, tasks[progress.task].id)

@@ -17,7 +17,7 @@ from gfmd_cli.solvers.loop import State
 from gfmd_cli.solvers.nested_grids import Resume
 from gfmd_cli.status import Status
 from gfmd_cli.study.checkpoint import Checkpoint
-from gfmd_cli.study.context import Progress, SolveContext, Watcher
+from gfmd_cli.study.context import ProgressEvent, SolveContext, Watcher
 from gfmd_cli.study.load_search import solve_at_load
 from gfmd_cli.study.measure import result
 from gfmd_cli.study.provenance import gfmd_version
@@ -52,7 +52,7 @@ class TaskWatcher(Watcher):
         """Whether a state could not be saved and the user was warned."""
         if (message := checkpoint.restore()) is not None:
             self._warn(message)
-        self.notes = checkpoint.notes
+        self.history = checkpoint.history
 
     def saved_state(self, contact: Contact) -> Resume | None:
         """At the first call, the state of this contact that an earlier run saved."""
@@ -89,7 +89,7 @@ class TaskWatcher(Watcher):
         if self.first_state == (contact.grid.whole_shape, state.step):
             self.stops_early = True  # else calls with too little time would never get further
             return
-        self.checkpoint.save(contact, state, self.notes)
+        self.checkpoint.save(contact, state, self.history)
         if self.stops_early:
             seconds = duration(max(1.0, time.monotonic() - self.begun))
             self._warn(
@@ -101,7 +101,7 @@ class TaskWatcher(Watcher):
     def _save(self, contact: Contact, state: State) -> None:
         """Save the state if there is space; the solve goes on without it."""
         try:
-            self.checkpoint.save(contact, state, self.notes)
+            self.checkpoint.save(contact, state, self.history)
         except SpaceError as error:
             if not self.unsaved:
                 self._warn(f"checkpoint: {error}; the solve goes on without")
@@ -113,7 +113,7 @@ class TaskWatcher(Watcher):
         if grid.whole:  # else this process has a part of the contact
             a_r = float(contact_points(contact.obstacle, state.u, state.sigma).mean())
         numbers = grid.points, state.step, state.residual, a_r
-        step = Progress(
+        step = ProgressEvent(
             task.index, "step", task.label, *numbers, size=grid.size, p_star=contact.pressure
         )
         self.context.report(step)
@@ -137,7 +137,7 @@ def attempt(task: Task, parts: Path, context: SolveContext) -> Status:
     except (GfmdError, MemoryError, ArithmeticError, OSError) as error:
         status = Status.NO_SPACE if isinstance(error, SpaceError) else Status.FAILED
         message = str(error) or type(error).__name__
-    context.report(Progress(task.index, "end", task.label, status=status, message=message))
+    context.report(ProgressEvent(task.index, "end", task.label, status=status, message=message))
     return status
 
 
@@ -158,7 +158,7 @@ def solve_task(task: Task, parts: Path, context: SolveContext) -> Status:
     """
     if not parts.is_dir():
         raise Interrupted(f"{parts}: renamed or deleted during the run")
-    context.report(Progress(task.index, "start", task.label))
+    context.report(ProgressEvent(task.index, "start", task.label))
     _check_files(task)  # before the work for it begins
     gfmd_version()  # kept from now on: the source tree may be updated during the solve
     start = time.perf_counter()
@@ -171,7 +171,7 @@ def solve_task(task: Task, parts: Path, context: SolveContext) -> Status:
             write_record(parts, record)
         checkpoint.remove()
     numbers = (record.entry.row[name] for name in ("points", "steps", "residual", "a_r", "status"))
-    context.report(Progress(task.index, "end", task.label, *numbers))
+    context.report(ProgressEvent(task.index, "end", task.label, *numbers))
     return solved.solution.status
 
 

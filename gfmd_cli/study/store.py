@@ -21,7 +21,7 @@ from gfmd_cli.errors import InputError, Interrupted, SpaceError, StudyError
 from gfmd_cli.files.atomic import check_place, new_file, target_of
 from gfmd_cli.files.checksums import Version, file_version
 from gfmd_cli.files.hdf5 import new_hdf5
-from gfmd_cli.files.locks import AS_LONG_AS_NEEDED, Waits, locked
+from gfmd_cli.files.locks import AS_LONG_AS_NEEDED, WaitOptions, locked
 from gfmd_cli.spec.models import Spec
 from gfmd_cli.status import Status
 from gfmd_cli.study import unfinished_work
@@ -44,8 +44,8 @@ class Study:
     Raises InputError for a link to itself and for a path without a name, such as "." or "/".
     """
 
-    def __init__(self, path: Path, waits: Waits = AS_LONG_AS_NEEDED) -> None:
-        self._waits = waits
+    def __init__(self, path: Path, wait_options: WaitOptions = AS_LONG_AS_NEEDED) -> None:
+        self._wait_options = wait_options
         self.path = target_of(path)
         if self.path.is_symlink():
             raise InputError(f"{path}: a symbolic link that leads to itself")
@@ -74,7 +74,7 @@ class Study:
                 for path in self.parts.glob(".*"):
                     with suppress(OSError):
                         path.unlink()
-        with locked(in_use, shared=True, waits=self._waits):
+        with locked(in_use, shared=True, wait_options=self._wait_options):
             self._held = in_use.stat()
             with self._collecting():
                 _, damaged = self._sound_records()
@@ -227,7 +227,7 @@ class Study:
 
     def _collecting(self) -> Any:
         """Keep other collectors out."""
-        return locked(self.parts / "collecting", waits=self._waits)
+        return locked(self.parts / "collecting", wait_options=self._wait_options)
 
 
 def _renamed(path: Path, target: Path) -> Path:

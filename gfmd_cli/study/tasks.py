@@ -17,7 +17,7 @@ from gfmd_cli.spec import models
 from gfmd_cli.spec_table import SpecTable
 from gfmd_cli.study import forecast
 
-LOAD_DIGITS = 14  # of a load that name its task: the last bit of a ladder depends on the machine
+LOAD_DIGITS = 14  # of a load that name its task: the last bit of a sequence depends on the machine
 MAX_TASKS = 100_000  # upper limit of a study, guards against typing errors
 MAX_COMBINATIONS = 2_000_000  # of all lists, of which paired lists choose a part
 WITH_FILES = ("surface", "elastomer")  # tables of the spec that may name a file
@@ -35,8 +35,8 @@ class Task:
     """Points along x; of an "auto" grid a forecast."""
     points_y: int
     """Points along y, likewise; 1 of a line."""
-    quantity: str
-    """Quantity that gives the load: one of LOADS."""
+    load_key: str
+    """Key of the load in [load]: one of LOADS."""
     load: float
     """Its value."""
     load_tolerance: float
@@ -70,7 +70,7 @@ class Task:
         is_fixed = self.surface.band_limited and (
             self.boundary == "periodic" or self.surface.mirrored() is not None
         )
-        return is_fixed or self.quantity != "p_star"
+        return is_fixed or self.load_key != "p_star"
 
     @property
     def label(self) -> str:
@@ -83,11 +83,11 @@ class Task:
     @property
     def load_label(self) -> str:
         """The load with its symbol."""
-        return models.load_text(self.quantity, self.load)
+        return models.load_text(self.load_key, self.load)
 
     def p_star(self, delta_sigma: float) -> float:
         """The reduced pressure, where it is known, on a scene with this Delta_sigma [Pa]."""
-        return self.load if self.quantity == "p_star" else self.load / delta_sigma
+        return self.load if self.load_key == "p_star" else self.load / delta_sigma
 
     @property
     def size(self) -> int:
@@ -123,12 +123,12 @@ class Task:
     @property
     def seconds(self) -> float:
         """Time that the task is expected to take on one thread, within a factor of about three."""
-        return self.seconds_at(self.load if self.quantity == "p_star" else forecast.P_STAR)
+        return self.seconds_at(self.load if self.load_key == "p_star" else forecast.P_STAR)
 
     def seconds_at(self, p_star: float) -> float:
         """The same with a load of about this reduced pressure."""
         solves = 1.0
-        if models.LOADS[self.quantity].searched:
+        if models.LOADS[self.load_key].searched:
             solves = forecast.SOLVES_PER_SEARCH[self.accuracy is not None]
         exponent, tolerance = self.elastomer.exponent, self.solver.tolerance
         pairs = forecast.pairs(exponent, p_star, tolerance, self.boundary)
@@ -174,7 +174,7 @@ def _tasks(spec: models.Spec, *, suited: bool) -> list[Task]:
                 **chosen | {"surface": surface},
                 points=points,
                 points_y=points_y,
-                quantity=spec.load.quantity,
+                load_key=spec.load.key,
                 load=load,
                 load_tolerance=spec.load.tolerance,
                 output=spec.output,
@@ -234,7 +234,7 @@ def _check(spec: models.Spec, *, suited: bool) -> None:
             chosen["solver"].check_elastomer(elastomer)
         if boundary == "free":
             elastomer.check_free_boundary(dimension)
-        if spec.load.quantity == "displacement":
+        if spec.load.key == "displacement":
             elastomer.check_displacement_load(boundary, dimension)
 
 
@@ -278,7 +278,7 @@ def _cell(spec: models.Spec, chosen: dict[str, Any], load: float) -> tuple[Rigid
         on_cell, points_y = grid.on_cell(surface, points)
         return on_cell, points, points_y
     assert spec.accuracy is not None  # of every spec with an "auto" grid
-    p_star = load if spec.load.quantity == "p_star" else forecast.P_STAR
+    p_star = load if spec.load.key == "p_star" else forecast.P_STAR
     exponent = chosen["elastomer"].exponent
     points = forecast.last_grid(surface, exponent, p_star, grid.boundary, spec.accuracy)
     first = forecast.first_grid(surface)
@@ -290,10 +290,10 @@ def _task_id(
     spec: models.Spec, resolved: dict[str, Any], tables: dict[str, Any], load: float
 ) -> str:
     """Name of a task: the digest of everything that its solution depends on."""
-    quantity = spec.load.quantity
-    content = [tables, quantity == "p_star", f"{load:.{LOAD_DIGITS}g}"]
-    if models.LOADS[quantity].searched:
-        content += [quantity, spec.load.tolerance]
+    key = spec.load.key
+    content = [tables, key == "p_star", f"{load:.{LOAD_DIGITS}g}"]
+    if models.LOADS[key].searched:
+        content += [key, spec.load.tolerance]
     if spec.accuracy is not None:
         content.append(resolved["accuracy"])
     return digest(content)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from math import isfinite, log
 from typing import Any
 
-from gfmd_cli.study.context import Progress
+from gfmd_cli.study.context import ProgressEvent
 from gfmd_cli.study.forecast import SECONDS_PER_PAIR
 from gfmd_cli.study.tasks import Task
 
@@ -58,13 +58,13 @@ class RemainingTime:
         self.forecast: dict[Any, float] = defaultdict(float)
         """Forecast seconds of the same tasks."""
 
-    def with_time_left(self, progress: Progress) -> Progress:
+    def with_time_left(self, progress: ProgressEvent) -> ProgressEvent:
         """An event, by which the estimate is updated, with the tasks that remain and their time."""
         self.update(progress)
         left = len(self.waiting) + len(self.running)
         return progress._replace(tasks_left=left, seconds_left=self.left())
 
-    def update(self, progress: Progress) -> None:
+    def update(self, progress: ProgressEvent) -> None:
         """Update the estimate by one progress event of a task."""
         index, now = progress.task, self.now()
         if progress.event in ("start", "end") and index in self.waiting:

@@ -9,7 +9,7 @@ from queue import SimpleQueue
 from threading import Event, Thread
 
 from gfmd_cli.errors import Interrupted
-from gfmd_cli.files.locks import Waits
+from gfmd_cli.files.locks import WaitOptions
 from gfmd_cli.grid import plans
 from gfmd_cli.status import Status
 from gfmd_cli.study.context import SolveContext
@@ -36,8 +36,8 @@ def serve(pipe: Connection) -> None:
     except RuntimeError as error:
         sys.exit(f"gfmd: a worker process: {error} (see ulimit -u)")
     try:
-        waits = Waits(context.stop, options.wait_until, run=os.getppid())
-        plans.plan_with(parts, estimated=options.reproducible, waits=waits)
+        wait_options = WaitOptions(context.stop, options.wait_until, run_pid=os.getppid())
+        plans.plan_with(parts, estimated=options.reproducible, wait_options=wait_options)
         pipe.send(READY)
         while True:
             pipe.send(attempt(tasks.get(), parts, context))

@@ -54,9 +54,9 @@ def write_study(
     values[layout.SCENE] = [scenes[entry.scene_id] for entry in entries]
     writer.columns(file, values, task)
     for histogram in layout.HISTOGRAMS:
-        if histogram.option in options:
+        if histogram.output_key in options:
             writer.histogram(file, histogram, task, rows)
-    with_arrays = {group.option for group in layout.TASK_GROUPS}
+    with_arrays = {group.output_key for group in layout.TASK_GROUPS}
     described = _on_finest_grids(entries)
     for index, entry in enumerate(entries):
         describes = described.get(entry.scene_id) == index

@@ -31,7 +31,7 @@ def fig07(studies: StoredStudies, folder: Path) -> list[Finding]:
     stresses = [one for group in _by_elastomer(studies, "fig07").values() for one in group]
     middle = geometric_middles(LOGARITHMIC_EDGES)
     for one in stresses:
-        style, fine = STYLES[one.curve.n], one.grids[-1]
+        style, fine = STYLES[one.curve.n], one.grid_densities[-1]
         plot.axes.plot(middle, np.where(fine > 0, fine, np.nan), color=style.colour, lw=0.7)
         draw_points(plot, style, *_known(one))
         resolved = (fine > 1e-2 * fine.max()) & (middle > LOWEST)
@@ -107,7 +107,7 @@ def fig13(studies: StoredStudies, folder: Path) -> list[Finding]:
     tones = colours(len(distribution.points))
     tails = {}
     for i, (points, density) in enumerate(
-        zip(distribution.points, distribution.grids, strict=True)
+        zip(distribution.points, distribution.grid_densities, strict=True)
     ):
         name = f"λₛ/Δa = {points * distribution.finest['cutoff']:.3g}"
         resolved = (density > 0) & (middle > 1e-2)

@@ -12,7 +12,7 @@ from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.solvers.loop import Solver, State
 from gfmd_cli.spec.models import OutputTable
 from gfmd_cli.study.checkpoint import Checkpoint
-from gfmd_cli.study.notes import Notes, Trial
+from gfmd_cli.study.history import TaskHistory, Trial
 from gfmd_cli.study.reading import open_study, read_rows
 from gfmd_cli.study.unfinished_work import read_record, write_record
 
@@ -89,7 +89,7 @@ def test_a_damaged_checkpoint_gives_an_older_state_or_none(tmp_path):
     with Checkpoint.exclusive(tmp_path / "c") as checkpoint:
         for step in (1, 2):
             state = State(u=rng.random((16, 16)), sigma=rng.random((16, 16)), step=step)
-            checkpoint.save(contact, state, Notes(trials=[Trial(16, step, 0.1, 1.0)]))
+            checkpoint.save(contact, state, TaskHistory(trials=[Trial(16, step, 0.1, 1.0)]))
             states.append(state.u)
     met = Counter()
     for name in ("a", "b", "pointer"):
@@ -105,7 +105,7 @@ def test_a_damaged_checkpoint_gives_an_older_state_or_none(tmp_path):
             else:
                 step = resume.state.step
                 met[f"from step {step}"] += 1
-                assert checkpoint.notes.trials[0].pressure == step
+                assert checkpoint.history.trials[0].pressure == step
                 assert (message is None) == (step == 2)
                 np.testing.assert_array_equal(resume.state.u, states[step - 1])
             shutil.rmtree(tmp_path / "d")

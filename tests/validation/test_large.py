@@ -78,7 +78,7 @@ def test_the_gap_summed_over_the_pressure_is_the_energy_of_full_contact(n):
     """
     case = scene(n, 256, SelfAffine(cutoff=0.01))
     full = case.contact(1.0)
-    elastic = full.elasticity(full.height.copy(), case.grid.empty())
+    elastic = full.apply_stiffness(full.height.copy(), case.grid.empty())
     energy = 0.5 * float(np.vdot(full.height, elastic)) / case.grid.size
     lowest, highest = 0.01, -float(elastic.min())
     log_p = np.linspace(np.log(lowest), np.log(highest), 61)

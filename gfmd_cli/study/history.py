@@ -24,7 +24,7 @@ class SolvedGrid:
     u_g: float
     """[m]."""
     perimeter: float
-    work: float
+    cost: float
     """Transforms times grid points."""
     border: float | None = None
     """Share of the border in contact, with a free boundary."""
@@ -42,7 +42,7 @@ class Trial:
 
     A mean gap is negative where the elastomer enters missing heights deeper than those filled in.
     """
-    work: float
+    cost: float
     """Transforms times grid points."""
     observables: dict[str, _Finite] = field(default_factory=dict)
     """a_r, sigma_p [Pa] and u_g [m]; that of the load is `value`. None without convergence."""
@@ -54,7 +54,7 @@ class Trial:
 
 @with_config(ConfigDict(strict=True, extra="forbid"))
 @dataclass
-class Notes:
+class TaskHistory:
     """Results of the grids and of the trials that have ended."""
 
     grids: list[SolvedGrid] = field(default_factory=list)
