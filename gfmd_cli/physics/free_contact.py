@@ -97,7 +97,7 @@ class FreeCompliance:
 class FreeContact(Contact):
     """Contact problem of a map on an elastomer without borders, at one pressure.
 
-    `stiffness` is empty: the elastomer is described by `free`.
+    `stiffness` is empty: the elastomer is described by `compliance`.
     """
 
     boundary: ClassVar[str] = "free"
