@@ -504,6 +504,7 @@ SOME = settings(max_examples=300)
 
 @example(power=5.0, first=10.0, steps=0, load_key="contact_area")  # a start on the plateau
 @example(power=5.0, first=-10.0, steps=101, load_key="contact_area")
+@example(power=0.05, first=-7.8125, steps=12, load_key="contact_area")  # a jump near p* = 1e6
 @SOME
 @curves
 def test_every_monotone_curve_is_searched_to_its_end(power, first, steps, load_key):

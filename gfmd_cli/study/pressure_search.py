@@ -150,5 +150,7 @@ class PressureSearch:
         is_inside = low.x + margin < x < high.x - margin
         if is_enclosed and (not is_inside or len(self.points) % 5 == 4):
             x = 0.5 * (low.x + high.x)
-        p = exp(x)
-        return p if self.lowest < p / self.scene.delta_sigma < PRESSURE_RANGE[1] else None
+        unit = self.scene.delta_sigma
+        p = min(exp(x), PRESSURE_RANGE[1] * unit)  # the upper end is tried, too
+        is_new = all(p != point.trial.pressure for point in self.points)
+        return p if is_new and p > self.lowest * unit else None
