@@ -56,9 +56,9 @@ class Pair:
 
     def values(self, name: str, suffix: str = "") -> tuple[float, float]:
         """A quantity in both studies, in the unit in which it is compared; "_error": its error."""
-        scale = MAIN_OBSERVABLES[name].unit_column if self.physical else ""
+        unit_column = MAIN_OBSERVABLES[name].unit_column if self.physical else ""
         a, b = (
-            float(row[name + suffix] * (row[scale] if scale else 1.0))
+            float(row[name + suffix] * (row[unit_column] if unit_column else 1.0))
             for row in (self.one, self.other)
         )
         return a, b

@@ -114,7 +114,7 @@ class LegendFigure:
         self.shared_name = ""
         """The part of the names of all curves that their labels leave out."""
         self.layers: list[PlotLayer] = []
-        """What scripts can draw anew."""
+        """Points, lines and bands as data, for a page that draws them anew."""
 
     def line_on(self, axes: Any, label: str, x: Field, y: Field, **style: Any) -> None:
         """Draw a line where y > 0 on some axes, with an entry of the legend."""

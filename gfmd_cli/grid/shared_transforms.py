@@ -155,9 +155,13 @@ class ColumnTransforms:
 def transform_memory(
     rows: LocalRows, columns: int, kind: Any, transposition: Transposition | None
 ) -> list[Modes]:
-    """Memory of the coefficients of so many columns; for a transposition, and as much again.
+    """Memory of the coefficients of a field; with a transposition, a second array for the exchange.
 
-    The latter is also enough for a real field with its halo.
+    The second array is also enough for a real field with its halo.
+
+    Parameters
+    ----------
+    columns : number of coefficients of a row of the field
     """
     if transposition is None:
         return [aligned(rows.count * columns, kind)]

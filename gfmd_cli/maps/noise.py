@@ -42,6 +42,7 @@ def noisy(
         return ""
     rows = np.atleast_2d(heights)
     noises, whole, left = {}, 0.0, 0.0
+    # a profile has one spacing, and no lines along y
     for axis, all_lines, step in zip("xy", (rows, rows.T), reversed(spacing), strict=False):
         some = all_lines[:: 1 + len(all_lines) // (2 * SAMPLED_LINES)]
         steps, noises[axis] = np.diff(some), _noise(some)

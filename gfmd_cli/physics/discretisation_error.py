@@ -260,7 +260,8 @@ def excess_exponent(elastomer: LinearElastomer, points: float, length: float) ->
     next coarser scale.
     """
     highest = pi * points / length * 2.0**OCTAVES
-    with np.errstate(over="ignore", invalid="ignore"):  # k beyond a table that ends steeply
+    # k may overflow beyond a table that ends steeply: the exponent is infinite there
+    with np.errstate(over="ignore", invalid="ignore"):
         exponents = elastomer.local_exponent(highest, length, HALF_OCTAVE)
     exponents = np.maximum(np.nan_to_num(exponents, nan=inf, posinf=inf), 0.0)
     weights = 0.5 ** np.minimum(OCTAVES[1:] + 1, OCTAVES[-1])

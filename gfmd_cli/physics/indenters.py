@@ -420,3 +420,4 @@ class Wave(LineIndenter):
 
 
 Indenter = Parabola | PowerLawIndenter | Cone | Punch | Ridge | LineParabola | Wave
+"""The single indenters."""

@@ -114,7 +114,7 @@ def bin_edges(q: Field) -> Field:
 
 def _smallest_distinct(q: Field, count: int) -> Field:
     """The `count` smallest different values in rising order, or all."""
-    for size in (4 * count, q.size):  # rarely do more modes than the first have so few values
+    for size in (4 * count, q.size):  # so few modes nearly always have enough different values
         low = np.sort(np.partition(q, size)[:size] if size < q.size else q)
         distinct: Field = low[np.append(True, np.diff(low) > _SAME_SHELL * low[1:])]
         if distinct.size >= count:

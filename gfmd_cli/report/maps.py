@@ -58,7 +58,7 @@ class Scale(NamedTuple):
     """Units of a quantity on axes."""
 
     si_unit: str
-    column: str
+    unit_column: str
     """Column of a row that holds the reduced unit."""
     symbol: str
 
@@ -67,7 +67,7 @@ class Scale(NamedTuple):
         if in_si(row, self.si_unit):
             divisor, unit = scaled(largest_value, self.si_unit)
             return divisor, f"{label} ({unit})"
-        return float(row[self.column]), f"{label} / {self.symbol}"
+        return float(row[self.unit_column]), f"{label} / {self.symbol}"
 
 
 LENGTH_SCALE = Scale("m", "length", "L")
@@ -83,8 +83,8 @@ def maps(data: ReportData) -> Section:
         contacts: list[Row] = []
         series = []
         curves = _chosen(rows_with_fields)
-        titles = [contact_and_boundary(rows[0]) for rows in curves]
-        titles = with_solvers(titles, [rows[0] for rows in curves])
+        first = [rows[0] for rows in curves]
+        titles = with_solvers(map(contact_and_boundary, first), first)
         for title, rows in zip(titles, curves, strict=True):
             drawn = [(row, _contact_maps(study, row, data.prefix)) for row in rows]
             drawn = [(row, each) for row, each in drawn if each["drawings"]]
@@ -108,7 +108,7 @@ def maps(data: ReportData) -> Section:
 
 
 def _chosen(stored: list[Row]) -> list[list[Row]]:
-    """At most MAX_CURVES curves, by all keys of their solvers; of each evenly spaced pressures."""
+    """At most MAX_CURVES curves, each of one scene and solver, and evenly spaced points of each."""
     curves = grouped(stored, lambda row: (row["scene"], *solver_of(row)))
     chosen = evenly(list(curves.values()), MAX_CURVES)
     pressures = [sorted(rows, key=lambda row: float(row["p_star"])) for rows in chosen]

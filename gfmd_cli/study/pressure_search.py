@@ -151,6 +151,6 @@ class PressureSearch:
         if is_enclosed and (not is_inside or len(self.points) % 5 == 4):
             x = 0.5 * (low.x + high.x)
         unit = self.scene.delta_sigma
-        p = min(exp(x), PRESSURE_RANGE[1] * unit)  # the upper end is tried, too
+        p = min(exp(x), PRESSURE_RANGE[1] * unit)  # the largest one is tried, too
         is_new = all(p != point.trial.pressure for point in self.points)
         return p if is_new and p > self.lowest * unit else None
