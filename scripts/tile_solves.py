@@ -42,9 +42,13 @@ class RecordedSolve(local_start.PeriodicSolve):
     """The solve on tiles, which counts its evaluations and steps on the finest grid."""
 
     max_exponent: ClassVar[float] = 9.0
-    max_fraction: ClassVar[tuple[float, float, float]] = (1.0, 0.0, 0.0)
     latest: ClassVar["RecordedSolve | None"] = None
     """The last solve on a finest grid."""
+
+    @staticmethod
+    def max_fraction(exponent: float) -> float:
+        """No limit."""
+        return 1.0
 
     def solve(self, tolerance: float) -> tuple[Evaluation, Field]:
         """See `LocalSolve`."""

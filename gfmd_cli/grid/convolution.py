@@ -6,13 +6,14 @@ are never stored padded, so that the memory is that of a field padded along x al
 share a field exchange no zero rows either.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from gfmd_cli.grid import plans
-from gfmd_cli.grid.arrays import Field, Precision
+from gfmd_cli.grid.arrays import Field, Modes, Precision
+from gfmd_cli.grid.modes import multiplicity
 from gfmd_cli.grid.rows import LocalRows
 from gfmd_cli.grid.shared_transforms import Columns, FieldTransforms, transform_memory
 from gfmd_cli.grid.transposition import Transposition
@@ -104,10 +105,29 @@ class PaddedTransform:
         np.multiply(values[:, : self.field_columns], scale, out=target)
         return out
 
+    def mean_square(self, symbol: Field) -> float:
+        """Mean square of a symbol over all waves but q = 0; of several processes, the share."""
+        first, last = self.span
+        across = multiplicity(self.padded_columns)[first:last]
+        total = multiplicity(self.padded_rows) @ np.square(symbol) @ across
+        longest = float(symbol[0, 0]) ** 2 if first == 0 else 0.0
+        return float(total - longest) / (self.padded_rows * self.padded_columns)
+
+    def in_single(self) -> "PaddedTransform":
+        """The same in single precision; its transforms work in the memory of these."""
+        transform = replace(self, precision="single")
+        vars(transform)["_memory"] = [part.view(np.complex64) for part in self._memory]
+        return transform
+
+    @cached_property
+    def _memory(self) -> list[Modes]:
+        """Memory of the transforms."""
+        kind, count = np.result_type(self.real, np.complex64), self.padded_columns // 2 + 1
+        return transform_memory(self.local_rows, count, kind, self.transposition)
+
     @cached_property
     def _transforms(self) -> FieldTransforms:
-        """The transforms of the padded fields, and their memory."""
-        rows, exchange, columns = self.local_rows, self.transposition, self.padded_columns
-        kind = np.result_type(self.real, np.complex64)
-        memory = transform_memory(rows, columns // 2 + 1, kind, exchange)
-        return FieldTransforms(memory, columns, rows, exchange, padded_rows=self.padded_rows)
+        """The transforms of the padded fields."""
+        rows, exchange = self.local_rows, self.transposition
+        size = self.padded_columns, rows, exchange
+        return FieldTransforms(self._memory, *size, padded_rows=self.padded_rows)

@@ -12,27 +12,24 @@ where means are taken over the map. At the solution, g = C sigma + c - h >= 0 an
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
-from math import inf, prod
+from math import inf, prod, sqrt
 from typing import Any, ClassVar
 
 import numpy as np
 from scipy.fft import dctn
 
-from gfmd_cli.grid.arrays import Field, Mask
+from gfmd_cli.grid.arrays import Field, Mask, SingleField
 from gfmd_cli.grid.convolution import PaddedTransform
 from gfmd_cli.grid.distributed import create_grid
 from gfmd_cli.grid.fft_grid import Grid, Shape
 from gfmd_cli.grid.ranks import Ranks
 from gfmd_cli.maps.map_preparation import mirror
+from gfmd_cli.physics import kernels
 from gfmd_cli.physics.contact import Contact, Scene
 from gfmd_cli.physics.indenters import RigidSurface
 from gfmd_cli.physics.linear_elastomer import LinearElastomer
 from gfmd_cli.physics.scenes import build_scene, reduce_scene, touchable
 from gfmd_cli.physics.surfaces import sample
-
-PRECONDITIONER_PADDING = 1.25
-"""Padding for the stiffness that serves as preconditioner. Measured at 256^2, p* = 1: 46 steps
-without padding, 36 with this, 33 with twofold padding (n = 1); 302 and 157 (n = 1.5)."""
 
 
 @dataclass(frozen=True)
@@ -53,22 +50,30 @@ class FreeCompliance:
         return transform, transform.symbol_of(kernel * self.unit)
 
     @cached_property
-    def _preconditioner(self) -> tuple[PaddedTransform, Field]:
-        """A transform of a few more points, and the stiffness k(q) there, in single precision."""
-        grid = self.grid
-        transform = grid.padded_transform(PRECONDITIONER_PADDING, "single")
-        q = transform.wavenumber(grid.spacings)
-        return transform, (self.elastomer.stiffness(q, grid.length) / self.unit).astype(np.float32)
+    def _convolution_of_moves(self) -> tuple[PaddedTransform, SingleField]:
+        """The same in single precision, in the same memory."""
+        transform, symbol = self._convolution
+        return transform.in_single(), symbol.astype(np.float32)
+
+    @cached_property
+    def rms(self) -> float:
+        """Rms of the symbol of C over all waves but the longest, whose error is a rigid shift.
+
+        White noise of the coefficients of a stress becomes noise of the displacement, so many times
+        as large.
+        """
+        transform, symbol = self._convolution
+        return sqrt(self.grid.total(transform.mean_square(symbol)))
 
     def displacement(self, stress: Field, out: Field) -> Field:
         """C sigma, written to `out`: one pair of transforms of twice the points a side."""
         transform, symbol = self._convolution
         return transform.apply(symbol, stress, out)
 
-    def approximate_stress(self, displacement: Field, out: Field) -> Field:
-        """An approximation of the stress that causes a displacement, written to `out`."""
-        transform, symbol = self._preconditioner
-        return transform.apply(symbol, displacement, out)
+    def change(self, move: SingleField, out: SingleField) -> None:
+        """C times a move of the stress in single precision, written to `out`."""
+        transform, symbol = self._convolution_of_moves
+        transform.apply(symbol, move, out)
 
     @property
     def smallest_compliance(self) -> float:
@@ -87,11 +92,6 @@ class FreeCompliance:
         """Cost of `displacement`, in transforms of the size of the map, by number of points."""
         return 2.0 * prod(self._convolution[0].padded) / self.grid.size
 
-    @property
-    def preconditioner_transforms(self) -> float:
-        """Cost of `approximate_stress`, whose single precision takes half of the time, likewise."""
-        return prod(self._preconditioner[0].padded) / self.grid.size
-
 
 @dataclass(frozen=True)
 class FreeContact(Contact):
@@ -109,14 +109,30 @@ class FreeContact(Contact):
         n = self.compliance.elastomer.exponent
         return (-inf, inf) if n is None else (n, n)
 
+    def stress_rounding(self, dtype: "np.dtype[Any]") -> float:
+        """Estimated rms error of the gap by rounding, divided by the rms displacement."""
+        return 0.5 * float(np.finfo(dtype).eps)
+
     def recompute(self, u: Field, sigma: Field) -> float:
         """Compute u from sigma, u = h in contact and above it elsewhere; return the residual."""
         gap = self.compliance.displacement(sigma, out=self.grid.empty())
         gap -= self.height
-        gap -= self.grid.mean(gap[sigma > 0])
-        residual = self.residual(gap + self.height, sigma)
-        self.set_displacement(u, gap, sigma > 0)
-        return residual
+        return self.balance(sigma, gap, u)
+
+    def balance(self, sigma: Field, gap: Field, u: Field, sums: Field | None = None) -> float:
+        """Subtract the mean gap in contact from the gap, and set u; return the residual.
+
+        `sums`, if they are known, are those of the kernel `gap_in_contact`.
+        """
+        rows, as_rows = self.grid.rows, self.grid.as_rows
+        fields = as_rows(sigma), as_rows(gap)
+        if sums is None:
+            sums = rows.sums(2, kernels.gap_in_contact, *fields)
+        total, count = sums.tolist()
+        level = total / count if count else 0.0
+        indenter = as_rows(self.height), as_rows(self.obstacle)
+        (squares,) = rows.sums(1, kernels.set_level, *indenter, *fields, level, as_rows(u))
+        return self.as_residual(squares)
 
     def reference_level(self, u: Field, sigma: Field) -> float:
         """Level c of the undeformed surface: <sigma u> = <sigma C sigma> + c p."""

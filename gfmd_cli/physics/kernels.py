@@ -31,3 +31,33 @@ def lay_pressed(h, u, sigma, change, stiffness, error, out, a, b):
             square += move * move
             change[i, j] = -move
         out[i, 0], out[i, 1] = count, square
+
+
+@kernel
+def gap_in_contact(sigma, gap, out, a, b):
+    """Sum of the gap over the points under pressure, and their number."""
+    for i in range(a, b):
+        total, count = 0.0, 0
+        for j in range(sigma.shape[1]):
+            pressed = sigma[i, j] > 0
+            total += gap[i, j] if pressed else 0.0
+            count += pressed
+        out[i, 0], out[i, 1] = total, count
+
+
+@kernel
+def set_level(h, obstacle, sigma, gap, level, u, out, a, b):
+    """Subtract the level from the gap, and set u; sum of the squares of min(u - obstacle, sigma).
+
+    u = h under pressure and where a point that can touch penetrates the indenter, else h + gap.
+    """
+    for i in range(a, b):
+        square = 0.0
+        for j in range(h.shape[1]):
+            g, s = gap[i, j] - level, sigma[i, j]
+            drop = h[i, j] - obstacle[i, j]  # not zero where nothing can touch
+            violation = min(g + drop, s)
+            square += violation * violation
+            gap[i, j] = g
+            u[i, j] = h[i, j] + (0.0 if s > 0 or (g < 0 and drop == 0) else g)
+        out[i, 0] = square

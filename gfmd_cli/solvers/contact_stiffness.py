@@ -35,6 +35,7 @@ from gfmd_cli.physics.free_contact import FreeContact
 from gfmd_cli.solvers.contact_state import FREE, PRESSED
 from gfmd_cli.solvers.preconditioners import create, select
 from gfmd_cli.solvers.projected_move import polak_ribiere
+from gfmd_cli.solvers.stress_preconditioner import StressPreconditioner
 
 MIN_RELATIVE_GAIN = 1e-10
 """Gain of a step over the sum of all gains that ends the iteration. The result then agrees with
@@ -86,17 +87,18 @@ def _stiffness(contact: Contact, touching: Mask) -> float:
 @_stiffness.register
 def _of_free_contact(contact: FreeContact, touching: Mask) -> float:
     """<sigma_1> / <1 - C sigma_1> by the same method; NaN if the iteration does not converge."""
-    compliance = contact.compliance
+    compliance, preconditioner = contact.compliance, StressPreconditioner(contact)
+    as_rows = contact.grid.as_rows
+    held = np.where(as_rows(touching), PRESSED, FREE).astype(np.int8), PRESSED
     rest = np.ones(contact.grid.shape)  # 1 - C sigma_1
-    force, z, response = (contact.grid.empty() for _ in range(3))
-    direction = np.zeros_like(rest)
+    force, response = (contact.grid.empty() for _ in range(2))
+    direction, z = np.zeros_like(rest), np.zeros(rest.shape, np.float32)
     total, slope, length = 0.0, 0.0, 0.0
     for _ in range(MAX_STEPS):
         np.multiply(rest, touching, out=force)
         if float(np.vdot(force, force)) <= TOLERANCE**2 * np.count_nonzero(touching):
             return total / float(rest[~touching].sum())
-        compliance.approximate_stress(force, out=z)
-        z *= touching
+        preconditioner.apply(as_rows(force), *held, out=as_rows(z))
         z_change = -length * float(np.vdot(z, response))  # z times the change of the force
         direction *= polak_ribiere(z_change, slope)
         direction += z

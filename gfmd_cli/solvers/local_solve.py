@@ -76,9 +76,6 @@ class LocalSolve:
     the other limits."""
     max_exponent: ClassVar[float]
     """Largest exponent n of k(q) for which it is."""
-    max_fraction: ClassVar[tuple[float, float, float]]
-    """Largest fraction of tiles that the contact can reach: for n = 0, its decrease with the
-    largest exponent n, and its lower limit."""
 
     def __init__(self, contact: Contact, tiles: Tiles, s: Field, pause: Callable[[], None]) -> None:
         self.contact, self.grid, self.pause = contact, contact.grid, pause
@@ -86,6 +83,11 @@ class LocalSolve:
         self.transforms = 0.0
         self.total = contact.pressure * contact.grid.size  # sum of the pressure over the grid
         self.place(tiles, s)
+
+    @staticmethod
+    def max_fraction(exponent: float) -> float:
+        """Largest fraction of tiles that the contact can reach, for a largest exponent n."""
+        raise NotImplementedError
 
     def place(self, tiles: Tiles, s: Field) -> None:
         """Take these tiles, and s with the mean pressure of the contact."""

@@ -55,10 +55,9 @@ def start_from(
     if not (doubled and is_large and all(map(_operators_apply, finer))):
         return None
     solve_on_tiles = LOCAL_SOLVES[last.boundary]
-    highest, decrease, lowest = solve_on_tiles.max_fraction
     for contact in finer:
         tiles = _tiles_in_reach(pressure > 0, is_periodic=contact.is_periodic)
-        fraction = max(highest - decrease * contact.exponents[1], lowest)
+        fraction = solve_on_tiles.max_fraction(contact.exponents[1])
         if tiles.count > fraction * tiles.used.size:
             return None
         s = _refined(pressure, tiles)
@@ -131,7 +130,11 @@ class PeriodicSolve(LocalSolve):
     operators_type = PeriodicOperators
     min_points: ClassVar[int] = 512
     max_exponent: ClassVar[float] = 2.05
-    max_fraction: ClassVar[tuple[float, float, float]] = (0.17, 0.1, 0.012)
+
+    @staticmethod
+    def max_fraction(exponent: float) -> float:
+        """Less for larger n, for which a solve on tiles takes more steps."""
+        return max(0.17 - 0.1 * exponent, 0.012)
 
     def compliance_everywhere(self, *, in_single_precision: bool) -> Field:
         """C s at all points, in the memory of the transforms."""
@@ -198,7 +201,11 @@ class FreeSolve(LocalSolve):
     operators_type = FreeOperators
     min_points: ClassVar[int] = 256
     max_exponent: ClassVar[float] = 1.55
-    max_fraction: ClassVar[tuple[float, float, float]] = (0.25, 0.0, 0.0)
+
+    @staticmethod
+    def max_fraction(exponent: float) -> float:
+        """Less for larger n, likewise."""
+        return min(0.53 - 0.3 * exponent, 0.25)
 
     def compliance_everywhere(self, *, in_single_precision: bool) -> Field:
         """C s at all points, always in double precision."""

@@ -1,14 +1,9 @@
-"""The step length and the direction of the solvers that project their moves on the constraint.
+"""The step length and the conjugation of the solvers that project their moves on the constraint.
 
 The solvers in u and in sigma share the rule for the length of a move. The energy is a parabola
 along the straight line to the projected point, lowest at the fraction `best` of it; all points on
 the line are feasible.
 """
-
-import numpy as np
-
-from gfmd_cli.grid.arrays import Field
-from gfmd_cli.grid.fft_grid import Grid
 
 MIN_FULL_MOVE = 0.5  # a full move lowers the energy if its best fraction is above 1/2
 """With 0.7 the transforms are 0.98 to 1.21 times as many, with 1: 1.00 to 1.23 times (n = 0.5 to 4,
@@ -33,42 +28,6 @@ def choose(best: float, is_unclipped: bool) -> tuple[float, float, bool]:
     is_full = best >= MIN_FULL_MOVE
     fraction = 1.0 if is_full else max(best, 0.0)
     return fraction, min(max(best, low), high), not is_full
-
-
-def feasible(grid: Grid, direction: Field, stress: Field) -> Field:
-    """A direction with the mean zero, and zero where it would make a stress of zero tensile.
-
-    With such points the energy may rise along the projected direction, however short the move
-    (Bertsekas, SIAM J. Control Optim. 20, 221, 1982).
-    """
-    direction = direction - grid.mean(direction)
-    moving = (stress > 0) | (direction > 0)
-    return np.where(moving, direction - grid.mean(direction[moving]), 0.0)
-
-
-def new_direction(grid: Grid, z: Field, last: Field, stress: Field, force: Field) -> Field:
-    """The feasible direction of z + last, or of z alone where that raises the energy.
-
-    z is the preconditioned force, `last` the last direction times beta.
-    """
-    direction = feasible(grid, z + last, stress)
-    return direction if grid.dot(direction, force) > 0 else feasible(grid, z, stress)
-
-
-def projected(grid: Grid, stress: Field, total: float) -> Field:
-    """The nearest stress >= 0 with this sum: max(stress - shift, 0).
-
-    Michelot, J. Optim. Theory Appl. 50, 195, 1986. The mean gap in contact is zero, so that a small
-    shift does not change the energy; a factor would.
-    """
-    stress = stress - grid.max(float(stress.max(initial=-np.inf)))  # so that one is always kept
-    shift, count = -np.inf, np.inf
-    while True:
-        kept = stress[stress > shift]
-        kept_sum, kept_count = grid.total(np.array([kept.sum(), kept.size]))
-        if kept_count >= count:
-            return np.maximum(stress - shift, 0.0)
-        shift, count = (kept_sum - total) / kept_count, kept_count
 
 
 def polak_ribiere(z_change: float, slope: float) -> float:

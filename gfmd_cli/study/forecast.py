@@ -48,16 +48,16 @@ PAIRS = {
         4.0: (30, 120, 72, 54, 31),
     },
     "free": {
-        0.5: (12, 12, 11, 30, 52),
-        1.0: (13, 14, 15, 66, 170),
-        1.5: (14, 17, 56, 430, 1100),
-        1.75: (97, 140, 280, 850, 5800),
+        0.5: (15, 14, 12, 24, 26),
+        1.0: (14, 16, 16, 43, 37),
+        1.5: (15, 18, 67, 130, 140),
+        1.75: (54, 79, 130, 540, 890),
     },
 }
 """Time of a solve in units of SECONDS_PER_PAIR times grid points, by boundary and n, at p* of these
 powers of ten. Means of 1024^2 and 2048^2, each at most 1.4 times larger or smaller:
 `scripts/forecast_pairs.py`; with a free boundary of 512^2 and 1024^2, at most 1.5 times:
-`--boundary free --points 512 1024 --cutoff 0.01`, the last row of 512^2 alone."""
+`--boundary free --points 512 1024 --cutoff 0.01`."""
 UNKNOWN_EXPONENT = {"periodic": 2.0, "free": 1.0}
 """The n of k(q) that is no power law, by boundary; a choice."""
 OTHER_PAIRS = 4.0

@@ -21,7 +21,7 @@ from gfmd_cli.grid import arrays
 from gfmd_cli.solvers.loop import State
 from gfmd_cli.study.history import PointCount, TaskHistory
 
-LAYOUT = 6
+LAYOUT = 7
 """Raised whenever a state of the old layout must not be resumed."""
 MAX_BYTES = 2**24
 """Size of a pointer: 100 bytes for each of at most 65536 processes, and the history."""

@@ -1,0 +1,104 @@
+"""The preconditioner of a free boundary: the stress of a punch that imposes a displacement.
+
+Stresses on the points O of the contact cause the displacement C_OO s there. The inverse of C_OO
+gives the stress that causes a displacement r on O and vanishes on all other points N, where the
+surface is free. With the stiffness K, that is K_OO r + K_ON w, where the displacement w of the free
+surface follows from K_NN w = -K_NO r (the Schur complement; Saad, Iterative Methods for Sparse
+Linear Systems, 2nd ed., section 14.2). Here
+
+- K is that of a periodic cell, enlarged, so that contacts at opposite borders are not neighbours;
+- w follows from one step of conjugate gradients from w = 0, or two where k(q) is steep. They are
+  preconditioned by the multigrid V-cycle of `pcg`.
+
+These steps lead to the lowest energy <r + w, K (r + w)> / 2 along their directions. Twice this
+energy is the product of r and the stress, which is therefore positive. With w = 0 it would be too
+large, as if the surroundings of the contact could not move, and the solver takes two to five times
+as many steps (docs/solver_measurements.md).
+"""
+
+from dataclasses import replace
+from math import ceil, isfinite
+from typing import Any
+
+import numpy as np
+
+from gfmd_cli.grid.arrays import Field, SingleField
+from gfmd_cli.grid.fft_grid import Grid
+from gfmd_cli.grid.plans import fast_length
+from gfmd_cli.physics.contact import Contact
+from gfmd_cli.physics.free_contact import FreeContact
+from gfmd_cli.solvers.contact_state import ContactState
+from gfmd_cli.solvers.multigrid import Multigrid, largest_growth
+
+PADDING = 1.25
+MAX_GROWTH = 2.5  # of k(q) per octave, up to which one cycle suffices; n = 1.3
+UNIT = 16  # the points per side are multiples of it, so that the levels of the V-cycle are halves
+
+
+class StressPreconditioner:
+    """An approximate inverse of the compliance restricted to some points of a map."""
+
+    def __init__(self, contact: FreeContact) -> None:
+        self.map, self.cell = contact.grid, _enlarged(contact.grid)
+        elastomer, unit = contact.compliance.elastomer, contact.compliance.unit
+        self.stiffness = elastomer.stiffness(self.cell.wavenumber(), self.map.length) / unit
+        self.single = self.cell.in_single()
+        periodic = Contact(self.cell, np.empty(0), self.stiffness, contact.pressure)
+        self.multigrid = Multigrid(periodic, self.single)
+        self.values: SingleField = self.multigrid.z[:, : self.cell.points]
+        self.stress = np.zeros(self.values.shape, np.float32)
+        self.response = np.zeros_like(self.stress)  # of the last step; not used with one
+        self.contact_state = self.cell.rows.empty_with_halo(self.cell.points, dtype=np.int8)
+        self.cycles = 1 if largest_growth(periodic) <= MAX_GROWTH else 2
+        pairs = (1 + self.cycles) * self.cell.size / self.map.size
+        self.transforms = self.single.pair_cost * pairs
+        """Cost of `apply` in transforms of the size of the map, without the V-cycle."""
+
+    def apply(
+        self, displacement: Field, contact_state: ContactState, threshold: int, out: SingleField
+    ) -> None:
+        """Write the stress of a displacement of the points that are held to `out`, else zero.
+
+        All fields have two axes.
+        """
+        held = contact_state >= threshold
+        self._enlarge(np.where(held, displacement, 0.0).astype(np.float32), self.values)
+        self._enlarge(contact_state, self.cell.rows.interior(self.contact_state))
+        self.single.filter_padded(self.stiffness)
+        self.stress[...] = self.values
+        self._relax(threshold)
+        own = self.cell.gather_rows(self.stress[:, : self.map.points], self.map.row_span)
+        np.multiply(own, held, out=out)
+
+    def _relax(self, threshold: int) -> None:
+        """Move the free points by steps of conjugate gradients; `stress` is that of all points."""
+        fields = self.stress, self.contact_state, threshold, self.response
+        last_curvature = 0.0
+        for _ in range(self.cycles):
+            descent, coupling = self.multigrid.apply(*fields)
+            curvature = self.single.filter_padded(self.stiffness)
+            if last_curvature > 0:
+                beta = -coupling / last_curvature
+                self.values += np.float32(beta) * self.response
+                curvature += beta * coupling
+            if not (curvature > 0 and isfinite(curvature)):
+                return
+            self.stress += np.float32(descent / curvature) * self.values
+            if self.cycles > 1:
+                self.response[...] = self.values
+            last_curvature = curvature
+
+    def _enlarge(self, field: Any, out: Any) -> None:
+        """Write a field of the map to the first rows and columns of the cell, zeros elsewhere."""
+        first, last = (min(row, self.map.points_y) for row in self.cell.row_span)
+        rows = self.map.gather_rows(field, (first, last))
+        out[...] = 0
+        out[: last - first, : self.map.points] = rows
+
+
+def _enlarged(grid: Grid) -> Grid:
+    """The periodic cell: pixels of the same size, at least `PADDING` times as many a side."""
+    shape = [UNIT * fast_length(ceil(PADDING * points / UNIT)) for points in grid.whole_shape]
+    sides = [n * spacing for n, spacing in zip(shape, grid.spacings, strict=True)]
+    cell = replace(grid, points=shape[-1], length=sides[-1])
+    return cell if grid.dimension == 1 else replace(cell, points_y=shape[0], length_y=sides[0])
