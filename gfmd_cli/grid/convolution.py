@@ -108,8 +108,8 @@ class PaddedTransform:
     def mean_square(self, symbol: Field) -> float:
         """Mean square of a symbol over all waves but q = 0; of several processes, the share."""
         first, last = self.span
-        across = multiplicity(self.padded_columns)[first:last]
-        total = multiplicity(self.padded_rows) @ np.square(symbol) @ across
+        down, across = map(multiplicity, (self.padded_rows, self.padded_columns))
+        total = np.einsum("i,ij,ij->j", down, symbol, symbol) @ across[first:last]
         longest = float(symbol[0, 0]) ** 2 if first == 0 else 0.0
         return float(total - longest) / (self.padded_rows * self.padded_columns)
 

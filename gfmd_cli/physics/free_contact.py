@@ -56,7 +56,7 @@ class FreeCompliance:
         return transform.in_single(), symbol.astype(np.float32)
 
     @cached_property
-    def rms(self) -> float:
+    def rms_symbol(self) -> float:
         """Rms of the symbol of C over all waves but the longest, whose error is a rigid shift.
 
         White noise of the coefficients of a stress becomes noise of the displacement, so many times
@@ -70,7 +70,7 @@ class FreeCompliance:
         transform, symbol = self._convolution
         return transform.apply(symbol, stress, out)
 
-    def change(self, move: SingleField, out: SingleField) -> None:
+    def displacement_by_move(self, move: SingleField, out: SingleField) -> None:
         """C times a move of the stress in single precision, written to `out`."""
         transform, symbol = self._convolution_of_moves
         transform.apply(symbol, move, out)

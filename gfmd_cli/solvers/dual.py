@@ -226,7 +226,7 @@ class _Run:
         else:
             self.change[...] = 0.0
             return False
-        self.compliance.change(self.z, out=self.change)
+        self.compliance.displacement_by_move(self.z, out=self.change)
         state.transforms += 0.5 * self.compliance.transforms
         sums = self.rows.sums(3, kernels.curvature, self.z, self.change)
         curvature, changed, moved = sums.tolist()
@@ -240,7 +240,7 @@ class _Run:
         fields = self.sigma, self.gap, *way, fraction, *self.chosen, self.change
         sums = self.rows.sums(2, kernels.advance, *fields)  # [5]
         state.residual = self.contact.balance(state.sigma, state.gap, state.u, sums)
-        square = fraction**2 * (changed + self.compliance.rms**2 * moved)
+        square = fraction**2 * (changed + self.compliance.rms_symbol**2 * moved)
         rounding = CONVOLUTION_ROUNDING * self.contact.as_residual(square)
         state.rounding = hypot(state.rounding, rounding)
         return True

@@ -205,7 +205,7 @@ class FreeSolve(LocalSolve):
     @staticmethod
     def max_fraction(exponent: float) -> float:
         """Less for larger n, likewise."""
-        return min(0.53 - 0.3 * exponent, 0.25)
+        return min(0.55 - 0.32 * exponent, 0.25)
 
     def compliance_everywhere(self, *, in_single_precision: bool) -> Field:
         """C s at all points, always in double precision."""

@@ -7,13 +7,13 @@ surface follows from K_NN w = -K_NO r (the Schur complement; Saad, Iterative Met
 Linear Systems, 2nd ed., section 14.2). Here
 
 - K is that of a periodic cell, enlarged, so that contacts at opposite borders are not neighbours;
-- w follows from one step of conjugate gradients from w = 0, or two where k(q) is steep. They are
+- w follows from one step of conjugate gradients from w = 0, or three where k(q) is steep. They are
   preconditioned by the multigrid V-cycle of `pcg`.
 
 These steps lead to the lowest energy <r + w, K (r + w)> / 2 along their directions. Twice this
 energy is the product of r and the stress, which is therefore positive. With w = 0 it would be too
-large, as if the surroundings of the contact could not move, and the solver takes two to five times
-as many steps (docs/solver_measurements.md).
+large, as if the surroundings of the contact could not move, and the solver would take up to nine
+times as many steps (docs/solver_measurements.md).
 """
 
 from dataclasses import replace
@@ -30,8 +30,10 @@ from gfmd_cli.physics.free_contact import FreeContact
 from gfmd_cli.solvers.contact_state import ContactState
 from gfmd_cli.solvers.multigrid import Multigrid, largest_growth
 
-PADDING = 1.25
-MAX_GROWTH = 2.5  # of k(q) per octave, up to which one cycle suffices; n = 1.3
+# Measured: `scripts/free_preconditioner.py`, tables of docs/solver_measurements.md.
+PADDING = 1.25  # of the cell, as a multiple of the map
+CYCLES = 1, 3  # steps for the free surface where k(q) grows slowly, and where it is steep
+MAX_GROWTH = 2.5  # of k(q) per octave, up to which it grows slowly; n = 1.3
 UNIT = 16  # the points per side are multiples of it, so that the levels of the V-cycle are halves
 
 
@@ -49,7 +51,7 @@ class StressPreconditioner:
         self.stress = np.zeros(self.values.shape, np.float32)
         self.response = np.zeros_like(self.stress)  # of the last step; not used with one
         self.contact_state = self.cell.rows.empty_with_halo(self.cell.points, dtype=np.int8)
-        self.cycles = 1 if largest_growth(periodic) <= MAX_GROWTH else 2
+        self.cycles = CYCLES[largest_growth(periodic) > MAX_GROWTH]
         pairs = (1 + self.cycles) * self.cell.size / self.map.size
         self.transforms = self.single.pair_cost * pairs
         """Cost of `apply` in transforms of the size of the map, without the V-cycle."""
@@ -71,7 +73,7 @@ class StressPreconditioner:
         np.multiply(own, held, out=out)
 
     def _relax(self, threshold: int) -> None:
-        """Move the free points by steps of conjugate gradients; `stress` is that of all points."""
+        """Move the free points by steps of conjugate gradients, and update `stress`."""
         fields = self.stress, self.contact_state, threshold, self.response
         last_curvature = 0.0
         for _ in range(self.cycles):

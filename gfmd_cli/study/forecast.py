@@ -50,8 +50,8 @@ PAIRS = {
     "free": {
         0.5: (15, 14, 12, 24, 26),
         1.0: (14, 16, 16, 43, 37),
-        1.5: (15, 18, 67, 130, 140),
-        1.75: (54, 79, 130, 540, 890),
+        1.5: (16, 18, 73, 120, 98),
+        1.75: (72, 99, 130, 380, 560),
     },
 }
 """Time of a solve in units of SECONDS_PER_PAIR times grid points, by boundary and n, at p* of these
