@@ -30,7 +30,7 @@ smoke: $(VENV)/.core ## the smallest complete study
 
 PYTEST := pytest -n 2 --dist loadfile
 # Files whose tests solve contacts on grids: threads change only their last bits.
-SOLVING := accuracy bench contact_stiffness direct_start free_accuracy free_boundary \
+SOLVING := accuracy bench contact_stiffness direct_start dual free_accuracy free_boundary \
 	free_contact_stiffness grid local_start multigrid observables_on_request properties \
 	rectangular_cells reference_solvers restarts search solvers study true_contact void
 

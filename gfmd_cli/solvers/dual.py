@@ -28,21 +28,22 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from gfmd_cli.grid.arrays import Field, SingleField
+from gfmd_cli.grid.arrays import Field, SingleField, dot
 from gfmd_cli.physics.contact import Contact
 from gfmd_cli.physics.free_contact import FreeContact
 from gfmd_cli.solvers import dual_kernels as kernels
 from gfmd_cli.solvers.contact_state import PENETRATING, PRESSED
 from gfmd_cli.solvers.loop import Solver, Start, State
-from gfmd_cli.solvers.projected_move import MAX_HALVINGS, choose, polak_ribiere
+from gfmd_cli.solvers.projected_move import choose, polak_ribiere
 from gfmd_cli.solvers.stress_preconditioner import StressPreconditioner
 
 MAX_PENETRATION = 0.3  # of the rms gap on penetrating points to that in contact; as in `pcg`
+MIN_LENGTH = 1e-6  # of a move; a shorter one lowers the energy by rounding only; a choice
 MAX_FRACTION = 100.0
 """Largest best fraction of a move. Of a move that is only rounding it can be 1e5, and the load
 would change by as many times its rounding. A choice: mostly the fraction is close to 1."""
-CONVOLUTION_ROUNDING = 2.0**-22
-"""Relative rms error of the coefficients of a move, and of its displacement, in single precision.
+CONVOLUTION_ROUNDING = 2.0
+"""Relative rms error of the coefficients of a move and of its displacement, in units of eps.
 
 The error of the gap in contact was 0.02 to 2.4 times what follows from it, in the median 0.4 times:
 `scripts/free_rounding.py`."""
@@ -90,6 +91,7 @@ class Dual(Solver):
         assert start.sigma is not None
         assert isinstance(start.contact, FreeContact)
         state = _new_state(start.contact.grid.empty(), start.sigma, start.u)
+        state.rounding = _rounding_afresh(start.contact, start.sigma, start.u)
         state.gap -= start.contact.height
         state.residual = start.contact.balance(state.sigma, state.gap, state.u)
         return state
@@ -106,8 +108,8 @@ class Dual(Solver):
         """Compute the gap, u and the residual from the stress."""
         contact.compliance.displacement(state.sigma, out=state.gap)
         state.transforms += contact.compliance.transforms
+        state.exact, state.rounding = True, _rounding_afresh(contact, state.sigma, state.gap)
         state.gap -= contact.height
-        state.exact, state.rounding = True, 0.0
         state.residual = contact.balance(state.sigma, state.gap, state.u)
 
     def iterate(self, contact: Any, state: Any) -> Iterator[DualState]:
@@ -130,6 +132,17 @@ def _new_state(u: Field, stress: Field, gap: Field) -> DualState:
     """A state without a last direction."""
     direction, change = (np.zeros(stress.shape, np.float32) for _ in range(2))
     return DualState(u=u, sigma=stress, gap=gap, direction=direction, change=change)
+
+
+def _rounding_afresh(contact: FreeContact, sigma: Field, displacement: Field) -> float:
+    """Estimated contribution of the rounding of C sigma in double precision to the residual."""
+    return _rounding(contact, np.float64, dot(sigma, sigma), dot(displacement, displacement))
+
+
+def _rounding(contact: FreeContact, dtype: type, stress: float, displacement: float) -> float:
+    """The same from sums of squares, also for a move in single precision and its displacement."""
+    squares = contact.grid.total(displacement + contact.compliance.rms_symbol**2 * stress)
+    return CONVOLUTION_ROUNDING * float(np.finfo(dtype).eps) * contact.as_residual(squares)
 
 
 class _Run:
@@ -215,7 +228,7 @@ class _Run:
     def advance(self) -> bool:
         """Move such that the energy falls; false if no length does that, because of rounding."""
         state = self.state
-        for _ in range(MAX_HALVINGS):
+        while state.length > MIN_LENGTH:
             highest, shift, clipped = self.project()  # [4]
             way = self.direction, state.length, highest, shift
             move = self.sigma, *way, self.gap, *self.chosen, self.z
@@ -224,7 +237,7 @@ class _Run:
                 break
             state.length, state.slope = 0.5 * state.length, 0.0
         else:
-            self.change[...] = 0.0
+            state.length, state.slope, self.change[...] = 1.0, 0.0, 0.0
             return False
         self.compliance.displacement_by_move(self.z, out=self.change)
         state.transforms += 0.5 * self.compliance.transforms
@@ -240,9 +253,8 @@ class _Run:
         fields = self.sigma, self.gap, *way, fraction, *self.chosen, self.change
         sums = self.rows.sums(2, kernels.advance, *fields)  # [5]
         state.residual = self.contact.balance(state.sigma, state.gap, state.u, sums)
-        square = fraction**2 * (changed + self.compliance.rms_symbol**2 * moved)
-        rounding = CONVOLUTION_ROUNDING * self.contact.as_residual(square)
-        state.rounding = hypot(state.rounding, rounding)
+        squares = fraction**2 * moved, fraction**2 * changed
+        state.rounding = hypot(state.rounding, _rounding(self.contact, np.float32, *squares))
         return True
 
     def crosses(self, length: float) -> bool:
