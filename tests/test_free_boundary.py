@@ -184,8 +184,9 @@ def test_the_gap_of_a_map_converges_with_the_grid():
 
 
 @pytest.mark.parametrize("stop_at", [0, 1, 5])
-def test_resumed_solve_is_bit_identical(stop_at):
-    contact, solver = build_free_scene(ROUGH, HalfSpace(), 128).contact(0.1), Dual()
+@pytest.mark.parametrize("elastomer", [HalfSpace(), Power(n=1.5)], ids=["n=1", "n=1.5"])
+def test_resumed_solve_is_bit_identical(elastomer, stop_at):
+    contact, solver = build_free_scene(ROUGH, elastomer, 128).contact(0.1), Dual()
     saved = []
 
     def watch(level, state):

@@ -106,7 +106,7 @@ class PaddedTransform:
         return out
 
     def mean_square(self, symbol: Field) -> float:
-        """Mean square of a symbol over all waves but q = 0; of several processes, the share."""
+        """Mean square of a symbol over all q except 0; with several processes, its part of that."""
         first, last = self.span
         down, across = map(multiplicity, (self.padded_rows, self.padded_columns))
         total = np.einsum("i,ij,ij->j", down, symbol, symbol) @ across[first:last]

@@ -57,10 +57,10 @@ class FreeCompliance:
 
     @cached_property
     def rms_symbol(self) -> float:
-        """Rms of the symbol of C over all waves but the longest, whose error is a rigid shift.
+        """Rms of the symbol of C over all q except 0, where an error only shifts the whole surface.
 
-        White noise of the coefficients of a stress becomes noise of the displacement, so many times
-        as large.
+        White noise in the coefficients of a stress becomes noise of the displacement that is larger
+        by this factor.
         """
         transform, symbol = self._convolution
         return sqrt(self.grid.total(transform.mean_square(symbol)))

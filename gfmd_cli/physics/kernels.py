@@ -55,7 +55,7 @@ def set_level(h, obstacle, sigma, gap, level, u, out, a, b):
         square = 0.0
         for j in range(h.shape[1]):
             g, s = gap[i, j] - level, sigma[i, j]
-            drop = h[i, j] - obstacle[i, j]  # not zero where nothing can touch
+            drop = h[i, j] - obstacle[i, j]  # zero where the point can touch
             violation = min(g + drop, s)
             square += violation * violation
             gap[i, j] = g

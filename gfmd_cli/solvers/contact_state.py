@@ -17,7 +17,8 @@ FREE, TENSILE, PRESSED = 0, 1, 2
 A kernel holds the points whose state is at least its `threshold`: PRESSED, or TENSILE where points
 under tension are not released.
 """
-PENETRATING = TENSILE  # in place of it if the stress is the unknown: no stress, a negative gap
+PENETRATING = TENSILE
+"""The same value; where the stress is the unknown: no stress and a negative gap."""
 
 
 def refined(touching: Mask, contact: Contact) -> Mask:

@@ -21,8 +21,8 @@ sigma_1 delta. The mean pressure grows by <sigma_1> delta, and the mean gap fall
     -dp/du_g = <sigma_1> / <1 - C sigma_1>.
 
 sigma_1 is the pressure, per displacement, under a flat punch of the shape of the contact. C is
-positive definite, and conjugate gradients find sigma_1, preconditioned by the stiffness as in
-`dual`, with the Polak-Ribiere formula, as the preconditioner has single precision.
+positive definite, and conjugate gradients find sigma_1, with the preconditioner of `dual`. It is in
+single precision, hence the Polak-Ribiere formula.
 """
 
 from functools import singledispatch

@@ -38,14 +38,17 @@ from gfmd_cli.solvers.projected_move import choose, polak_ribiere
 from gfmd_cli.solvers.stress_preconditioner import StressPreconditioner
 
 MAX_PENETRATION = 0.3  # of the rms gap on penetrating points to that in contact; as in `pcg`
-MIN_LENGTH = 1e-6  # of a move; a shorter one lowers the energy by rounding only; a choice
+MIN_LENGTH = 1e-18
+"""Of a move; a shorter one changes nothing in double precision. Where stresses close to zero make
+the energy rise along a longer move, one as short as that sets them to zero."""
 MAX_FRACTION = 100.0
-"""Largest best fraction of a move. Of a move that is only rounding it can be 1e5, and the load
-would change by as many times its rounding. A choice: mostly the fraction is close to 1."""
+"""Upper limit of the fraction `best` of a move. If a move consists of rounding only, `best` can be
+1e5, and would multiply the rounding error of the load as much. A choice: mostly `best` is about 1.
+"""
 CONVOLUTION_ROUNDING = 2.0
 """Relative rms error of the coefficients of a move and of its displacement, in units of eps.
 
-The error of the gap in contact was 0.02 to 2.4 times what follows from it, in the median 0.4 times:
+The error of the gap in contact was at most 2.4 times what follows from it, in the median 0.4 times:
 `scripts/free_rounding.py`."""
 
 
@@ -136,12 +139,13 @@ def _new_state(u: Field, stress: Field, gap: Field) -> DualState:
 
 def _rounding_afresh(contact: FreeContact, sigma: Field, displacement: Field) -> float:
     """Estimated contribution of the rounding of C sigma in double precision to the residual."""
-    return _rounding(contact, np.float64, dot(sigma, sigma), dot(displacement, displacement))
+    squares = np.array([dot(sigma, sigma), dot(displacement, displacement)])
+    return _rounding(contact, np.float64, *contact.grid.total(squares).tolist())
 
 
 def _rounding(contact: FreeContact, dtype: type, stress: float, displacement: float) -> float:
     """The same from sums of squares, also for a move in single precision and its displacement."""
-    squares = contact.grid.total(displacement + contact.compliance.rms_symbol**2 * stress)
+    squares = displacement + contact.compliance.rms_symbol**2 * stress
     return CONVOLUTION_ROUNDING * float(np.finfo(dtype).eps) * contact.as_residual(squares)
 
 
@@ -180,10 +184,10 @@ class _Run:
         fields = self.z, self.gap, self.change, self.direction, *self.chosen
         sums = self.rows.sums(7, kernels.products, *fields)
         slope, z_change, z_sum, gap_sum, change_sum, last_sum, count = sums.tolist()
-        mean = z_sum / count
+        mean = z_sum / count if count else 0.0
         beta = polak_ribiere(z_change - mean * change_sum, state.slope)
         state.slope = slope - mean * gap_sum
-        if not self.combine(mean, beta, beta * last_sum / count):
+        if not self.combine(mean, beta, beta * last_sum / count if count else 0.0):
             self.combine(mean, 0.0, 0.0)
 
     def combine(self, z_mean: float, beta: float, mean: float) -> bool:
@@ -205,7 +209,7 @@ class _Run:
         return True
 
     def project(self) -> tuple[float, float, bool]:
-        """Highest target of the move, its shift below that, and whether the move is clipped.
+        """The largest s + l d, the shift relative to it, and whether negative values are cut off.
 
         The nearest stresses s >= 0 with the sum of the present ones are max(target - shift, 0)
         (Michelot, J. Optim. Theory Appl. 50, 195, 1986). The mean gap in contact is zero, so that

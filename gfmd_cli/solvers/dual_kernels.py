@@ -1,8 +1,8 @@
 """Compiled kernels of conjugate gradients in the stress; see `dual`.
 
 The points that may move are those whose contact state is at least `threshold`; the stress of all
-others is zero. The target of a move is s + length d - shift there, or zero if that is negative.
-Targets are computed anew in each kernel, with the same rounding, so that no field stores them.
+others is zero. The target of a move is s + length d - highest - shift there, or zero if that is
+negative, where `highest` is the largest of s + length d. Each kernel computes the targets anew.
 """
 
 import numpy as np
@@ -28,10 +28,7 @@ def classify(h, obstacle, sigma, gap, contact_state, out, a, b):
 
 @kernel
 def products(z, gap, change, last, contact_state, threshold, out, a, b):
-    """Over the points that may move: z gap, z change, and the sums and number of its terms.
-
-    These are the sums of z, of the gap, of the change and of the last direction.
-    """
+    """Sums over the points that may move: z gap, z change, z, gap, change, last direction, 1."""
     for i in range(a, b):
         slope = z_change = z_sum = gap_sum = change_sum = last_sum = 0.0
         count = 0
@@ -53,8 +50,8 @@ def products(z, gap, change, last, contact_state, threshold, out, a, b):
 def combine(z, z_mean, beta, mean, sigma, gap, contact_state, threshold, direction, out, a, b):
     """direction <- z_mean - z + beta direction - mean on the points that may move, else zero.
 
-    Sums over the points whose stress this does not make tensile: those of the direction, of
-    direction times gap and of the gap, and their number.
+    Sums, over these points except those without stress whose direction is tensile, of the
+    direction, of minus direction times gap, of the gap, and of 1.
     """
     for i in range(a, b):
         total = descent = gap_sum = 0.0
@@ -74,7 +71,7 @@ def combine(z, z_mean, beta, mean, sigma, gap, contact_state, threshold, directi
 
 @kernel
 def subtract_mean(direction, mean, sigma, contact_state, threshold, a, b):
-    """Subtract the mean where the direction does not make a stress tensile; zero elsewhere."""
+    """Subtract the mean; zero where the direction makes a stress of zero tensile."""
     for i in range(a, b):
         for j in range(direction.shape[1]):
             d = direction[i, j]
@@ -86,20 +83,24 @@ def subtract_mean(direction, mean, sigma, contact_state, threshold, a, b):
 def _distances(s, d, length, highest, row):
     """Write s + length d - highest of a row of points, from which the shift is then subtracted.
 
-    In one expression the compiler could add highest and shift first, which loses a shift that is
-    far smaller.
+    The loops are separate, so that s + length d is rounded as in `highest_target`, and so that the
+    compiler does not add highest and shift first, which loses a shift that is far smaller.
     """
     for j in range(s.size):
-        row[j] = s[j] + length * d[j] - highest
+        row[j] = s[j] + length * d[j]
+    for j in range(s.size):
+        row[j] -= highest
 
 
 @kernel
 def highest_target(sigma, direction, length, contact_state, threshold, out, a, b):
-    """Highest of s + length d over each row, and the number of negative ones."""
+    """Largest s + length d of each row, and the number of points where it is negative."""
+    row = np.empty(sigma.shape[1])
     for i in range(a, b):
         highest, count = out[i, 0], 0
+        _distances(sigma[i], direction[i], length, 0.0, row)
         for j in range(sigma.shape[1]):
-            target = sigma[i, j] + length * direction[i, j]
+            target = row[j]
             moves = contact_state[i, j] >= threshold
             highest = max(highest, target) if moves else highest
             count += moves and target < 0
@@ -109,10 +110,12 @@ def highest_target(sigma, direction, length, contact_state, threshold, out, a, b
 @kernel
 def kept_targets(sigma, direction, length, highest, shift, contact_state, threshold, out, a, b):
     """Sum of s + length d - highest over the points where it is above the shift; their number."""
+    row = np.empty(sigma.shape[1])
     for i in range(a, b):
         total, count = 0.0, 0
+        _distances(sigma[i], direction[i], length, highest, row)
         for j in range(sigma.shape[1]):
-            target = sigma[i, j] + length * direction[i, j] - highest
+            target = row[j]
             kept = contact_state[i, j] >= threshold and target > shift
             total += target if kept else 0.0
             count += kept
@@ -142,15 +145,14 @@ def curvature(move, change, out, a, b):
     for i in range(a, b):
         product = changed = moved = 0.0
         for j in range(move.shape[1]):
-            product += move[i, j] * change[i, j]
-            changed += change[i, j] * change[i, j]
-            moved += move[i, j] * move[i, j]
+            m, c = np.float64(move[i, j]), np.float64(change[i, j])
+            product, changed, moved = product + m * c, changed + c * c, moved + m * m
         out[i, 0], out[i, 1], out[i, 2] = product, changed, moved
 
 
 @kernel
 def crossing(sigma, direction, length, out, a, b):
-    """Number of points at which s + length d is negative."""
+    """Number of points at which the stress would become tensile."""
     for i in range(a, b):
         count = 0
         for j in range(sigma.shape[1]):

@@ -4,7 +4,7 @@ On the tiles that the contact can reach
 
     minimise <s C s> / 2 - <s h>  over s >= 0,  <s> = p.
 
-The method is projected conjugate gradients in the pressure, as in `dual`, with the stiffness K
+The method is projected conjugate gradients in the pressure, as in `dual`, but with the stiffness K
 restricted to the tiles as preconditioner (Vollebregt, Tribol. Int. 78, 40, 2014, uses its transform
 on the whole grid). C s is then evaluated at all points by the exact operator. This shows tiles that
 the displacement enters elsewhere, which are added, and the error of the operators on tiles, which
@@ -86,7 +86,7 @@ class LocalSolve:
 
     @staticmethod
     def max_fraction(exponent: float) -> float:
-        """Largest fraction of tiles that the contact can reach, for a largest exponent n."""
+        """Largest fraction of tiles that the contact can reach; the largest n of k(q) is given."""
         raise NotImplementedError
 
     def place(self, tiles: Tiles, s: Field) -> None:

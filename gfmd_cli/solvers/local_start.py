@@ -204,7 +204,7 @@ class FreeSolve(LocalSolve):
 
     @staticmethod
     def max_fraction(exponent: float) -> float:
-        """Less for larger n, likewise."""
+        """Smaller for larger n, as in a periodic cell."""
         return min(0.55 - 0.32 * exponent, 0.25)
 
     def compliance_everywhere(self, *, in_single_precision: bool) -> Field:

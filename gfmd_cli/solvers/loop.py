@@ -17,7 +17,7 @@ from gfmd_cli.status import Status
 MAX_MISSES, PROGRESS_FACTOR = 5, 0.7
 """One or two misses occur when sigma has drifted. So many in a row, none of which reduces the true
 residual by this factor, mean that rounding is the limit."""
-ROUNDING_MARGIN = 3.0  # over the estimate of the rounding; the error was 0.35 to 2.5 times it
+ROUNDING_MARGIN = 3.0  # over the estimate of the rounding; the error was at most 2.5 times it
 
 
 @dataclass(kw_only=True)
@@ -30,7 +30,9 @@ class State:
     u: Field
     """Displacement, u >= h."""
     sigma: Field
-    """Stress K u + p, up to the rounding of its updates since `exact` was true."""
+    """Stress K u + p, up to the rounding of its updates since `exact` was true.
+
+    With a free boundary it is the unknown, and what is updated is the gap."""
     exact: bool = True
     """Whether sigma was computed from u, not updated."""
     residual: float = inf
@@ -38,7 +40,8 @@ class State:
     step: int = 0
     """Steps on this grid so far."""
     rounding: float = 0.0
-    """Estimate of what the rounding of the updates of sigma adds to the residual; 0 if unknown."""
+    """Estimate of what the rounding of sigma (free boundary: of the gap) adds to the residual; 0 if
+    unknown."""
     transforms: float = 0
     """Transforms on this grid so far."""
     coarser_transforms: float = 0.0
@@ -162,7 +165,8 @@ def ignore(contact: Contact, state: State) -> None:
 def is_certain(contact: Contact, state: State, tolerance: float) -> bool:
     """Whether the residual of an updated sigma is below a tolerance despite all rounding.
 
-    The minimum of gap and stress, of which the residual consists, changes by no more than sigma.
+    The residual consists of the minimum of gap and stress, which changes by no more than the one
+    that is updated.
     """
     if state.rounding == 0 or state.residual + ROUNDING_MARGIN * state.rounding >= tolerance:
         return False

@@ -1,4 +1,4 @@
-"""The step length and the conjugation of the solvers that project their moves on the constraint.
+"""The step length and the factor beta of the solvers that project their moves on the constraint.
 
 The solvers in u and in sigma share the rule for the length of a move. The energy is a parabola
 along the straight line to the projected point, lowest at the fraction `best` of it; all points on

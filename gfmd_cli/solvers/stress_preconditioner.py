@@ -8,10 +8,10 @@ Linear Systems, 2nd ed., section 14.2). Here
 
 - K is that of a periodic cell, enlarged, so that contacts at opposite borders are not neighbours;
 - w follows from one step of conjugate gradients from w = 0, or three where k(q) is steep. They are
-  preconditioned by the multigrid V-cycle of `pcg`.
+  preconditioned by the multigrid V-cycle of `pcg`. Without levels for it w = 0.
 
-These steps lead to the lowest energy <r + w, K (r + w)> / 2 along their directions. Twice this
-energy is the product of r and the stress, which is therefore positive. With w = 0 it would be too
+Each step minimises the energy <r + w, K (r + w)> / 2 along its direction. Twice this energy is the
+product of r and the stress, which is therefore positive. With w = 0 it would be too
 large, as if the surroundings of the contact could not move, and the solver would take up to nine
 times as many steps (docs/solver_measurements.md).
 """
@@ -28,13 +28,15 @@ from gfmd_cli.grid.plans import fast_length
 from gfmd_cli.physics.contact import Contact
 from gfmd_cli.physics.free_contact import FreeContact
 from gfmd_cli.solvers.contact_state import ContactState
-from gfmd_cli.solvers.multigrid import Multigrid, largest_growth
+from gfmd_cli.solvers.multigrid import Multigrid, has_coarser_level, largest_growth
 
 # Measured: `scripts/free_preconditioner.py`, tables of docs/solver_measurements.md.
 PADDING = 1.25  # of the cell, as a multiple of the map
-CYCLES = 1, 3  # steps for the free surface where k(q) grows slowly, and where it is steep
-MAX_GROWTH = 2.5  # of k(q) per octave, up to which it grows slowly; n = 1.3
-UNIT = 16  # the points per side are multiples of it, so that the levels of the V-cycle are halves
+CYCLES = 1, 3  # steps for the free surface up to MAX_GROWTH, and above
+MAX_GROWTH = 2.5  # of k(q) per octave; n = 1.3
+UNIT = (
+    16  # the points per side are multiples of it, so that levels have half as many as the finer one
+)
 
 
 class StressPreconditioner:
@@ -45,13 +47,16 @@ class StressPreconditioner:
         elastomer, unit = contact.compliance.elastomer, contact.compliance.unit
         self.stiffness = elastomer.stiffness(self.cell.wavenumber(), self.map.length) / unit
         self.single = self.cell.in_single()
-        periodic = Contact(self.cell, np.empty(0), self.stiffness, contact.pressure)
-        self.multigrid = Multigrid(periodic, self.single)
-        self.values: SingleField = self.multigrid.z[:, : self.cell.points]
+        padded = self.single.as_rows(self.single.padded)
+        self.values: SingleField = padded[:, : self.cell.points]
         self.stress = np.zeros(self.values.shape, np.float32)
-        self.response = np.zeros_like(self.stress)  # of the last step; not used with one
+        self.response = np.zeros_like(self.stress)  # K times the last direction; 0 before
         self.contact_state = self.cell.rows.empty_with_halo(self.cell.points, dtype=np.int8)
-        self.cycles = CYCLES[largest_growth(periodic) > MAX_GROWTH]
+        self.cycles = 0
+        if has_coarser_level(self.cell):
+            periodic = Contact(self.cell, np.empty(0), self.stiffness, contact.pressure)
+            self.multigrid = Multigrid(periodic, self.single)
+            self.cycles = CYCLES[largest_growth(periodic) > MAX_GROWTH]
         pairs = (1 + self.cycles) * self.cell.size / self.map.size
         self.transforms = self.single.pair_cost * pairs
         """Cost of `apply` in transforms of the size of the map, without the V-cycle."""
@@ -59,7 +64,9 @@ class StressPreconditioner:
     def apply(
         self, displacement: Field, contact_state: ContactState, threshold: int, out: SingleField
     ) -> None:
-        """Write the stress of a displacement of the points that are held to `out`, else zero.
+        """Write the stress of a displacement of the points in contact to `out`, zero elsewhere.
+
+        These are the points whose contact state is at least the threshold.
 
         All fields have two axes.
         """

@@ -188,6 +188,15 @@ def test_a_free_boundary_is_that_of_one_process(mpiexec, tmp_path, count, shape,
     assert_same(tmp_path / "one.h5", tmp_path / "many.h5", exact=count == 1)
 
 
+def test_oblong_pixels_with_a_free_boundary(mpiexec, tmp_path):
+    """Levels of the V-cycle are not shared on such pixels."""
+    path, square = tmp_path / "spec.toml", FREE.format(n=1, points_y=96, points=48)
+    path.write_text(square.replace("cutoff = 0.1", "cutoff = 0.1\nlength = 1.0\nlength_y = 1.0"))
+    on_one(path, tmp_path / "one.h5")
+    mpiexec(2, "gfmd_cli", "run", path, "-o", tmp_path / "many.h5", "-q")
+    assert_same(tmp_path / "one.h5", tmp_path / "many.h5", exact=False)
+
+
 def test_a_free_boundary_with_error_bars(mpiexec, tmp_path):
     path = tmp_path / "spec.toml"
     path.write_text(
