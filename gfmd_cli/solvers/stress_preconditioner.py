@@ -1,9 +1,9 @@
 """The preconditioner of a free boundary: the stress of a punch that imposes a displacement.
 
 Stresses on the points O of the contact cause the displacement C_OO s there. The inverse of C_OO
-gives the stress that causes a displacement r on O and vanishes on all other points N, where the
-surface is free. With the stiffness K, that is K_OO r + K_ON w, where the displacement w of the free
-surface follows from K_NN w = -K_NO r (the Schur complement; Saad, Iterative Methods for Sparse
+gives the stress that causes a displacement r on O and vanishes on all other points F, where the
+surface is free. With the stiffness K, that is K_OO r + K_OF w, where the displacement w of the free
+surface follows from K_FF w = -K_FO r (the Schur complement; Saad, Iterative Methods for Sparse
 Linear Systems, 2nd ed., section 14.2). Here
 
 - K is that of a periodic cell, enlarged, so that contacts at opposite borders are not neighbours;
@@ -11,9 +11,9 @@ Linear Systems, 2nd ed., section 14.2). Here
   preconditioned by the multigrid V-cycle of `pcg`. Without levels for it w = 0.
 
 Each step minimises the energy <r + w, K (r + w)> / 2 along its direction. Twice this energy is the
-product of r and the stress, which is therefore positive. With w = 0 it would be too
-large, as if the surroundings of the contact could not move, and the solver would take up to nine
-times as many steps (docs/solver_measurements.md).
+product of r and the stress, which is therefore positive. With w = 0 it would be too large, as if
+the surroundings of the contact could not move, and the solver would take up to nine times as many
+steps (docs/solver_measurements.md).
 """
 
 from dataclasses import replace
@@ -34,9 +34,7 @@ from gfmd_cli.solvers.multigrid import Multigrid, has_coarser_level, largest_gro
 PADDING = 1.25  # of the cell, as a multiple of the map
 CYCLES = 1, 3  # steps for the free surface up to MAX_GROWTH, and above
 MAX_GROWTH = 2.5  # of k(q) per octave; n = 1.3
-UNIT = (
-    16  # the points per side are multiples of it, so that levels have half as many as the finer one
-)
+UNIT = 16  # the points per side are multiples of it, so that each level has half of the finer one
 
 
 class StressPreconditioner:
@@ -66,9 +64,8 @@ class StressPreconditioner:
     ) -> None:
         """Write the stress of a displacement of the points in contact to `out`, zero elsewhere.
 
-        These are the points whose contact state is at least the threshold.
-
-        All fields have two axes.
+        These are the points whose contact state is at least the threshold. All fields have two
+        axes.
         """
         held = contact_state >= threshold
         self._enlarge(np.where(held, displacement, 0.0).astype(np.float32), self.values)
