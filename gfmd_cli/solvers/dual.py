@@ -116,7 +116,7 @@ class Dual(Solver):
         state.residual = contact.balance(state.sigma, state.gap, state.u)
 
     def iterate(self, contact: Any, state: Any) -> Iterator[DualState]:
-        """Advance `state` in place by steps of one application of C and two of K."""
+        """Advance `state` in place by steps of one application of C and some of K."""
         yield state  # a start that is good enough needs no working memory
         run = _Run(contact, state)
         while True:

@@ -48,7 +48,7 @@ class StressPreconditioner:
         padded = self.single.as_rows(self.single.padded)
         self.values: SingleField = padded[:, : self.cell.points]
         self.stress = np.zeros(self.values.shape, np.float32)
-        self.response = np.zeros_like(self.stress)  # K times the last direction; 0 before
+        self.response = np.zeros_like(self.stress)  # K times the last direction
         self.contact_state = self.cell.rows.empty_with_halo(self.cell.points, dtype=np.int8)
         self.cycles = 0
         if has_coarser_level(self.cell):
