@@ -15,6 +15,7 @@ from specs import power_spec
 
 from gfmd_cli.cli import main
 from gfmd_cli.errors import Interrupted
+from gfmd_cli.grid import plans
 from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.spec.parse import read_spec
 from gfmd_cli.study import run_task
@@ -72,6 +73,13 @@ def estimated_plans():
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("GFMD_PLANS", "estimated")
         yield
+
+
+@pytest.fixture
+def small_plans_measured(monkeypatch):
+    """Plans of small grids that are measured, as those of large ones are."""
+    monkeypatch.delenv("GFMD_PLANS", raising=False)  # under `make test-portable` too
+    monkeypatch.setattr(plans, "MIN_MEASURED_POINTS", 0)
 
 
 @pytest.fixture

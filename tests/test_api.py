@@ -117,9 +117,9 @@ def test_every_run_that_fails_gives_its_warnings(tmp_path):
     assert {warning[2] for warning in shown} == {__file__}
 
 
+@pytest.mark.usefixtures("small_plans_measured")
 def test_plans_are_estimated_from_the_next_call_on(monkeypatch):
     """As a notebook asks for them that has solved the contact before."""
-    monkeypatch.delenv("GFMD_PLANS", raising=False)
     flags, make = set(), pyfftw.FFTW
     solve(TABLES)
     monkeypatch.setattr(

@@ -17,13 +17,11 @@ POINTS = 30
 
 
 @pytest.fixture
-def wisdom(tmp_path, monkeypatch):
+def wisdom(tmp_path, monkeypatch, small_plans_measured):
     """What FFTW measured for a grid; a folder to keep it in. The cache is empty before."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     plans.plan_with(tmp_path)
     Grid(POINTS).transform()
-    if plans.plans() == "estimated":  # GFMD_PLANS
-        pytest.skip("transforms are not measured")
     yield plans.read_wisdom(tmp_path)
     plans.plan_with(None)
 
@@ -104,6 +102,7 @@ def test_the_checksum_of_wisdom_is_read(wisdom, tmp_path):
     assert plans.read_wisdom(tmp_path) is None
 
 
+@pytest.mark.usefixtures("small_plans_measured")
 def test_the_cache_of_plans_stays_small(tmp_path, monkeypatch):
     """Every new size reads and writes all of it; a process that was killed left a part of it."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
@@ -115,8 +114,6 @@ def test_the_cache_of_plans_stays_small(tmp_path, monkeypatch):
     study.mkdir()
     for folder in (None, study, None):
         plans.plan_with(folder)
-        if plans.plans() == "estimated":  # GFMD_PLANS
-            pytest.skip("transforms are not measured")
         for points in (34, 38, 46, 58, 62):
             Grid(points).transform()
             assert 0 < lines_of(plans.read_wisdom(cache)) <= 100
@@ -151,6 +148,7 @@ def test_plans_do_not_depend_on_what_else_is_known(wisdom, tmp_path, monkeypatch
     assert known[0] != known[1]
 
 
+@pytest.mark.usefixtures("small_plans_measured")
 @pytest.mark.parametrize("way", ["estimated", ""])
 def test_a_process_searches_for_the_plans_of_a_grid_once(tmp_path, monkeypatch, way):
     """Also where FFTW has planned another one since; an estimate of 1024^2 takes 20 ms or more."""

@@ -342,6 +342,7 @@ def test_a_surface_is_drawn_and_reduced_on_one_grid(monkeypatch):
     assert sizes == [32**2]
 
 
+@pytest.mark.usefixtures("small_plans_measured")
 def test_a_plan_measured_for_the_first_time_destroys_nothing(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     known = SelfAffine(cutoff=0.05).heights(96)

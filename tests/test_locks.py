@@ -130,13 +130,12 @@ def test_a_wait_ends_with_the_time_of_the_run(lock, kind, holder, monkeypatch):
         pass
 
 
-@pytest.mark.usefixtures("springs")
+@pytest.mark.usefixtures("springs", "small_plans_measured")
 @pytest.mark.parametrize("name", ["collecting", "planning"])
 def test_a_run_with_a_time_limit_does_not_wait_longer_for_another(
     tmp_path, monkeypatch, invoke, name
 ):
     monkeypatch.setattr(locks, "LONG_SECONDS", 0.05)
-    monkeypatch.delenv("GFMD_PLANS", raising=False)  # under `make test-portable` too
     monkeypatch.chdir(tmp_path)
     (tmp_path / "springs.parts").mkdir()
     limit = ("-o", "springs.h5", "--max-hours", 1e-4)
@@ -236,13 +235,12 @@ def test_a_process_with_the_number_of_a_dead_one_is_told_by_its_start(lock, monk
         assert acquired
 
 
-@pytest.mark.usefixtures("springs")
+@pytest.mark.usefixtures("springs", "small_plans_measured")
 @pytest.mark.parametrize("number", sorted(locks.NO_LOCKS))
 def test_a_run_without_locks_is_complete_and_leaves_no_files(tmp_path, monkeypatch, invoke, number):
     without_locks(monkeypatch, number)
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    monkeypatch.delenv("GFMD_PLANS", raising=False)  # under `make test-portable` too
     done = invoke("run", "spec.toml", "-j", "1", "-o", "study.h5")
     assert done.exit_code == 0, done.output
     assert [row["status"] for row in read_rows(Path("study.h5"))] == ["converged"] * 2
@@ -366,7 +364,7 @@ def test_without_locks_an_owner_that_leaves_after_long_is_no_damaged_lock(lock, 
         assert acquired
 
 
-@pytest.mark.usefixtures("springs")
+@pytest.mark.usefixtures("springs", "small_plans_measured")
 def test_a_lock_of_the_cache_that_nobody_frees_is_waited_for_once(tmp_path, monkeypatch, invoke):
     without_locks(monkeypatch)
     waits, sleep = [], time.sleep
@@ -375,7 +373,6 @@ def test_a_lock_of_the_cache_that_nobody_frees_is_waited_for_once(tmp_path, monk
         locks.time, "sleep", lambda seconds: (waits.append(seconds), sleep(seconds))
     )
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    monkeypatch.delenv("GFMD_PLANS", raising=False)  # under `make test-portable` too
     monkeypatch.chdir(tmp_path)
     (tmp_path / "cache").mkdir()
     owned_elsewhere(tmp_path / "cache" / "gfmd" / "planning")

@@ -427,9 +427,9 @@ def test_a_reproducible_run_has_the_same_bits_on_any_number_of_processes(run):
         assert json.loads(file.attrs["machine"])["plans"] == "estimated"
 
 
+@pytest.mark.usefixtures("small_plans_measured")
 def test_plans_are_kept_beside_an_unfinished_study(run, tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    monkeypatch.delenv("GFMD_PLANS", raising=False)  # under `make test-portable` too
     run(shard=(0, 4))
     wisdom = plans.read_wisdom(tmp_path / "study.parts")
     cached = plans.read_wisdom(tmp_path / "cache" / "gfmd")
@@ -451,10 +451,10 @@ def test_plans_are_kept_beside_an_unfinished_study(run, tmp_path, monkeypatch):
     assert any("planned anew" in event.message for event in events)
 
 
+@pytest.mark.usefixtures("small_plans_measured")
 def test_runs_in_two_threads_keep_their_plans_apart(tmp_path, monkeypatch):
     """Each stores its plans beside its own study, although FFTW knows those of the other."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    monkeypatch.delenv("GFMD_PLANS", raising=False)  # under `make test-portable` too
     one, other = tmp_path / "one", tmp_path / "other"
     values = np.zeros(97, dtype=complex)
     for folder in (one, other):

@@ -44,6 +44,8 @@ class Grid:
     """Number of points along y; 0 stands for as many as along x. A line has one."""
     length_y: float = 0.0
     """Side along y [m]; 0 stands for the points along y times the spacing along x."""
+    is_temporary: bool = False
+    """Whether it makes few transforms, for which measuring a plan would take longer."""
 
     def __post_init__(self) -> None:
         points_y = self.points_y or self.points if self.dimension == 2 else 1
@@ -211,7 +213,9 @@ class Grid:
     def _transforms(self) -> FieldTransforms:
         """All transforms of this grid, in one memory."""
         transposition = self._transposition(self.points // 2 + 1)
-        return FieldTransforms(self._memory, self.points, self.rows, transposition)
+        return FieldTransforms(
+            self._memory, self.points, self.rows, transposition, is_measured=not self.is_temporary
+        )
 
     @property
     def work(self) -> Modes:

@@ -1,5 +1,8 @@
 """Plans of Fourier transforms: measured once and stored, or estimated.
 
+To measure is to compare hundreds of plans, which takes a tenth of a second or more for each
+transform, also where the transform itself takes microseconds. An estimated plan is found at once;
+with estimated plans, a solve on a large grid takes up to 30 % longer (docs/performance.md).
 Estimated plans are the same in every run without being stored.
 
 FFTW's wisdom (what it has measured) is stored as text: beside the study of a run, so that a resumed
@@ -39,6 +42,9 @@ Planner = Callable[..., Any]
 Wisdom = dict[str, list[str]]
 """Texts in double and in single precision by the key of a group of transforms."""
 PLANNING_SECONDS = (30.0, 1e-6)  # time limit of a search for a plan: constant, and per grid point
+MIN_MEASURED_POINTS = 2**17  # of a field; plans of smaller ones are estimated
+"""Solves with 256 points a side take up to 7 % longer, smaller ones as long as with measured plans,
+and planning takes half the time: docs/performance.md, `scripts/plan_times.py`."""
 MAX_WISDOM_BYTES = 2**24  # of a file of wisdom
 MAX_CACHED_LINES = 20000  # of wisdom; a new size adds some 50 and reads and writes all
 KEY = re.compile("[0-9a-f]{16}")
@@ -141,20 +147,19 @@ def plans() -> str:
 def planned_transforms(make: Callable[[Planner], T], size: int = 0) -> T:
     """The transforms that `make` plans. Plans that are not known yet are measured and stored.
 
-    The time limit of a measurement increases with the number of grid points, `size`.
+    `size` is the number of points of the field that is transformed. Plans of small fields are
+    estimated; the time limit of a measurement increases with the size.
     """
-    fftw = partial(pyfftw.FFTW, planning_timelimit=PLANNING_SECONDS[0] + PLANNING_SECONDS[1] * size)
+    is_estimated = are_estimated() or size < MIN_MEASURED_POINTS
+    effort = "FFTW_ESTIMATE" if is_estimated else "FFTW_MEASURE"
+    limit = PLANNING_SECONDS[0] + PLANNING_SECONDS[1] * size
+    fftw = partial(pyfftw.FFTW, planning_timelimit=limit, flags=(effort,))
     with _planner:
         key = _key(make)
-        known = _estimates if are_estimated() else _known.setdefault(_planning.get(), {})
+        known = _estimates if is_estimated else _known.setdefault(_planning.get(), {})
         with suppress(KeyError, RuntimeError):  # not known
             return _by_wisdom(known[key], make, fftw)
-        return (_searched if are_estimated() else _measured)(known, key, make, fftw)
-
-
-def _effort() -> str:
-    """How FFTW compares plans."""
-    return "FFTW_ESTIMATE" if are_estimated() else "FFTW_MEASURE"
+        return (_searched if is_estimated else _measured)(known, key, make, fftw)
 
 
 def _key(make: Callable[[Planner], Any]) -> str:
@@ -173,26 +178,26 @@ def _key(make: Callable[[Planner], Any]) -> str:
     return hashlib.sha256("\n".join(problems).encode()).hexdigest()[:16]
 
 
-def _by_wisdom(texts: list[str], make: Callable[[Planner], T], fftw: Planner) -> T:
+def _by_wisdom(texts: list[str], make: Callable[[Planner], T], fftw: partial[Any]) -> T:
     """The transforms that `make` plans, from their wisdom. Raises RuntimeError if it lacks one."""
     pyfftw.forget_wisdom()
     # Importing a text takes 0.25 ms. One without plans, each of which is in brackets, is left out.
     double, single = (text.encode() if text.count("(") > 1 else b"" for text in texts)
     pyfftw.import_wisdom((double, single, b""))  # third: of long double
-    return make(partial(fftw, flags=(_effort(), "FFTW_WISDOM_ONLY")))
+    return make(partial(fftw, flags=(*fftw.keywords["flags"], "FFTW_WISDOM_ONLY")))
 
 
-def _searched(known: Wisdom, key: str, make: Callable[[Planner], T], fftw: Planner) -> T:
+def _searched(known: Wisdom, key: str, make: Callable[[Planner], T], fftw: partial[Any]) -> T:
     """The transforms that `make` plans; their wisdom is added to `known`."""
     pyfftw.forget_wisdom()
-    transforms = make(partial(fftw, flags=(_effort(),)))
+    transforms = make(fftw)
     known[key] = _export()
     with suppress(RuntimeError):  # the time limit has ended the search
         transforms = _by_wisdom(known[key], make, fftw)
     return transforms
 
 
-def _measured(known: Wisdom, key: str, make: Callable[[Planner], T], fftw: Planner) -> T:
+def _measured(known: Wisdom, key: str, make: Callable[[Planner], T], fftw: partial[Any]) -> T:
     """The same, measured and stored unless another process has measured them."""
     of_study = _planning.get().folder
     folder = of_study or cache_folder()

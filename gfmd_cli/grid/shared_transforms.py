@@ -11,7 +11,7 @@ they are transformed, multiplied and transformed back.
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 from itertools import cycle, pairwise
 from math import ceil, prod
 from operator import call
@@ -48,19 +48,27 @@ class RowTransforms:
         arrays = [(values[a:b], lines[a:b]) for a, b in rows.parts]
         self._forward = [fftw(v, c, (1,), "FFTW_FORWARD").execute for v, c in arrays]
         self._backward = [fftw(c, v, (1,), "FFTW_BACKWARD").execute for v, c in arrays]
-        block = pyfftw.empty_aligned((BLOCK_ROWS, lines.shape[1]), dtype=lines.dtype)
-        real = block.view(values.dtype)[:, : values.shape[1]]
-        count = len(rows.parts) if len(lines) % BLOCK_ROWS == 0 else 0
-        self._of_block = [fftw(real, block, (1,), "FFTW_FORWARD") for _ in range(count)]
+        self._count = len(rows.parts) if len(lines) % BLOCK_ROWS == 0 else 0
 
     def forward(self, blocks: Sequence[int] | None = None) -> None:
         """Transform all rows, or some blocks of `BLOCK_ROWS` rows while the others are zero."""
-        calls, count = self._forward, len(self._of_block)
+        calls, count = self._forward, self._count
         if blocks is not None and count:
             self.lines.view(self.values.dtype)[:, self.values.shape[1] :] = 0.0
             shares = ((plan, blocks[i::count]) for i, plan in enumerate(self._of_block))
             calls = [partial(self._transform, *share) for share in shares]
         side_by_side(self.pool, calls)
+
+    @cached_property
+    def _of_block(self) -> list[Any]:
+        """Plans of a block for each thread, made when they are needed."""
+        block = pyfftw.empty_aligned((BLOCK_ROWS, self.lines.shape[1]), dtype=self.lines.dtype)
+        real = block.view(self.values.dtype)[:, : self.values.shape[1]]
+
+        def make(fftw: Planner) -> list[Any]:
+            return [fftw(real, block, (1,), "FFTW_FORWARD") for _ in range(self._count)]
+
+        return planned_transforms(make)
 
     def backward(self) -> None:
         """Transform all rows back."""
@@ -183,6 +191,7 @@ class FieldTransforms:
     rows : the rows of this process
     transposition : exchange between the processes that share the field; None for one process
     padded_rows : number of rows to which the columns are padded by zeros; 0 for no padding
+    is_measured : whether plans may be measured; otherwise they are estimated
     """
 
     def __init__(
@@ -193,6 +202,7 @@ class FieldTransforms:
         transposition: Transposition | None,
         *,
         padded_rows: int = 0,
+        is_measured: bool = True,
     ) -> None:
         shape = (rows.count, points // 2 + 1)
         self.lines: Modes = memory[0][: prod(shape)].reshape(shape)
@@ -214,7 +224,7 @@ class FieldTransforms:
             along_columns = ColumnTransforms(self.work, rows, fftw, length)
             return RowTransforms(self.values, self.lines, rows, fftw), along_columns
 
-        transforms = planned_transforms(make, self.values.size)
+        transforms = planned_transforms(make, self.values.size if is_measured else 0)
         self.along_rows, self.along_columns = transforms
 
     def to_columns(self, blocks: Sequence[int] | None = None) -> None:

@@ -234,8 +234,8 @@ SCENES: dict[str, Callable[..., Scene]] = {"periodic": build_scene, "free": buil
 
 
 def doubled_grid(grid: Grid) -> Grid:
-    """A grid of twice the points along each axis, on a cell of twice the sides."""
-    along_x = replace(grid, points=2 * grid.points, length=2 * grid.length)
+    """A temporary grid of twice the points along each axis, on a cell of twice the sides."""
+    along_x = replace(grid, points=2 * grid.points, length=2 * grid.length, is_temporary=True)
     if grid.dimension == 1:
         return along_x
     return replace(along_x, points_y=2 * grid.points_y, length_y=2 * grid.length_y)

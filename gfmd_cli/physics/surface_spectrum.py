@@ -1,6 +1,6 @@
 """Power spectral density of a surface in bands of wavenumber, with the self-affine fit."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import nan, pi, prod
 
 import numpy as np
@@ -13,8 +13,9 @@ from gfmd_cli.physics.elastomers import HalfSpace
 from gfmd_cli.physics.indenters import RigidSurface
 from gfmd_cli.physics.linear_elastomer import LinearElastomer
 from gfmd_cli.physics.persson import Shells
-from gfmd_cli.physics.scenes import build_scene
+from gfmd_cli.physics.scenes import reduce_scene
 from gfmd_cli.physics.spectrum_fit import SelfAffineFit, fit
+from gfmd_cli.physics.surfaces import sample
 
 BANDS_PER_DECADE = 10  # a choice
 ROUNDING = 1e-9  # of a wavenumber, and of the power of a map, relative
@@ -79,7 +80,8 @@ def map_spectrum(surface: RigidSurface) -> Spectrum | None:
     tapered = surface.tapered_map()
     if tapered is None:
         return None
-    scene = build_scene(tapered, HalfSpace(), tapered.smallest_grid())
+    grid, heights = sample(tapered, tapered.smallest_grid())
+    scene = reduce_scene(replace(grid, is_temporary=True), heights, HalfSpace())
     return spectrum(scene.shells, scene.grid.sides, scene.grid.whole_shape)
 
 

@@ -20,6 +20,7 @@ OUTPUTS = {
 }
 
 
+@pytest.mark.usefixtures("small_plans_measured")
 def test_a_full_disk_is_one_message_and_the_run_goes_on_when_there_is_space(
     folder, gfmd, disk, monkeypatch
 ):

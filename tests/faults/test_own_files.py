@@ -65,7 +65,7 @@ def unfinished(tmp_path_factory):
 
 
 @pytest.fixture
-def study(unfinished, tmp_path, monkeypatch, gfmd):
+def study(unfinished, tmp_path, monkeypatch, gfmd, small_plans_measured):
     """A copy of it, with plans in its folder and in the cache."""
     place = tmp_path / "study"
     monkeypatch.setenv("XDG_CACHE_HOME", str(place / "cache"))
