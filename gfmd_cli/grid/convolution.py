@@ -19,12 +19,12 @@ from gfmd_cli.grid.shared_transforms import Columns, FieldTransforms, transform_
 from gfmd_cli.grid.transposition import Transposition
 
 
-def padded_shape(shape: tuple[int, ...], factor: float) -> tuple[int, ...]:
-    """Numbers of points that are fast to transform, at least `factor` times those of a shape.
+def padded_shape(shape: tuple[int, ...]) -> tuple[int, ...]:
+    """Numbers of points that are fast to transform, at least twice those of a shape.
 
-    A factor of 2 makes a convolution linear: no load acts around the border.
+    This makes a convolution linear: no load acts around the border.
     """
-    return tuple(plans.fast_length(factor * n) for n in shape)
+    return tuple(plans.fast_length(2 * n) for n in shape)
 
 
 @dataclass(eq=False)
@@ -57,13 +57,6 @@ class PaddedTransform:
         """Shape of a symbol, even in q_y and q_x: q_y >= 0, and the q_x >= 0 of this process."""
         first, last = self.span
         return self.padded_rows // 2 + 1, last - first
-
-    def wavenumber(self, spacings: tuple[float, ...]) -> Field:
-        """|q| [1/m] of the padded cell, of `symbol_shape`; `spacings` [m] in the order (y, x)."""
-        sides = self.padded_rows * spacings[0], self.padded_columns * spacings[-1]
-        numbers = np.arange(self.symbol_shape[0]), np.arange(*self.span)
-        y, x = (m * (2 * np.pi / side) for m, side in zip(numbers, sides, strict=True))
-        return np.hypot(y[:, None], x)
 
     def symbol_of(self, kernel: Field) -> Field:
         """The symbol of a convolution with a kernel G(|y|, |x|), given at the points of a field.

@@ -359,13 +359,11 @@ class Grid:
         rows = self.gather_rows(values, covered_rows(target.row_span, *of))
         return average_rows(rows, target.row_span, *of).reshape(target.shape)
 
-    def padded_transform(self, factor: float, precision: Precision = "double") -> PaddedTransform:
-        """Transforms of fields that are padded by zeros to `factor` times the points a side."""
-        padded = padded_shape(self.whole_shape, factor)
+    def padded_transform(self) -> PaddedTransform:
+        """Transforms of fields that are padded by zeros to twice the points a side."""
+        shape, padded = self.whole_shape, padded_shape(self.whole_shape)
         transposition = self._transposition(padded[-1] // 2 + 1)
-        return PaddedTransform(
-            self.whole_shape, padded, precision, self._threads, transposition=transposition
-        )
+        return PaddedTransform(shape, padded, threads=self._threads, transposition=transposition)
 
     def collect(self, field: Field) -> Field | None:
         """All of a field, on the first process; None on the others."""

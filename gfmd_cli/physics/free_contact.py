@@ -46,7 +46,7 @@ class FreeCompliance:
         """The transform of twice the points, and the symbol of the compliance C."""
         grid = self.grid
         kernel = self.elastomer.free_compliance(grid.whole_shape, grid.spacings, grid.own)
-        transform = grid.padded_transform(2.0)
+        transform = grid.padded_transform()
         return transform, transform.symbol_of(kernel * self.unit)
 
     @cached_property

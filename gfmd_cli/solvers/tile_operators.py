@@ -140,7 +140,7 @@ class FreeOperators(TileOperators):
         cell = Grid(MIN_CELL_POINTS, points_y=MIN_CELL_POINTS, length=sides[1], length_y=sides[0])
         k = compliance.elastomer.stiffness(cell.wavenumber(), grid.length) / compliance.unit
         shape = tuple(points // COARSENING + SPLINE_ORDER - 1 for points in grid.shape)
-        padded = padded_shape(shape, 2.0)
+        padded = padded_shape(shape)
         transform = PaddedTransform(shape, padded, "single", len(grid.rows.parts))
         symbol = transform.symbol_of(_smooth_part(contact, shape, COARSENING))
         super().__init__(grid, short_ranged, _near_values(k), transform, symbol)
