@@ -689,7 +689,7 @@ def plan(fftw):
     planning.set()
     end.wait(0.5)
 
-Thread(target=plans.planned_transforms, args=(plan,)).start()
+Thread(target=plans.planned_transforms, args=(plan, 0)).start()
 planning.wait()
 child = multiprocessing.get_context("fork").Process(target=lambda: print(solve(SPEC).status))
 child.start()

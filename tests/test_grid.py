@@ -9,12 +9,15 @@ import pyfftw
 import pytest
 from fourier import backward, forward
 
-from gfmd_cli.grid import shared_transforms
+from gfmd_cli.grid import plans, shared_transforms
 from gfmd_cli.grid.distributed import DistributedGrid
 from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.physics.elastomers import Power
+from gfmd_cli.physics.file_surface import FileSurface
+from gfmd_cli.physics.free_contact import build_free_scene
 from gfmd_cli.physics.scenes import build_scene
 from gfmd_cli.physics.self_affine import SelfAffine
+from gfmd_cli.physics.surface_spectrum import map_spectrum
 
 ROUNDING = 1e-14  # a few units in the last place, times log2 of the size, for fields of order one
 GRIDS = [
@@ -340,6 +343,65 @@ def test_a_surface_is_drawn_and_reduced_on_one_grid(monkeypatch):
     monkeypatch.setattr(shared_transforms, "planned_transforms", note)
     build_scene(SelfAffine(cutoff=0.1), Power(n=1), 32)
     assert sizes == [32**2]
+
+
+@pytest.fixture
+def planning(tmp_path, monkeypatch, small_plans_measured):
+    """How transforms were planned since the last call: the flags of FFTW."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    monkeypatch.setattr(plans, "_estimates", {})
+    plans.plan_with(None)
+    flags, make = set(), pyfftw.FFTW
+
+    def note(*arrays, **options):
+        flags.add(options["flags"][0])
+        return make(*arrays, **options)
+
+    def planning():
+        seen = flags.copy()
+        flags.clear()
+        return seen
+
+    monkeypatch.setattr(pyfftw, "FFTW", note)
+    return planning
+
+
+def test_plans_of_small_and_of_temporary_grids_are_estimated(planning, monkeypatch):
+    monkeypatch.setattr(plans, "MIN_MEASURED_POINTS", 40 * 36)
+    for points, is_temporary, effort in [
+        (40, False, "FFTW_MEASURE"),
+        (39, False, "FFTW_ESTIMATE"),
+        (40, True, "FFTW_ESTIMATE"),
+    ]:
+        grid = Grid(points, points_y=36, is_temporary=is_temporary)
+        for each in (grid, grid.in_single()):
+            each.padded[...] = 0.0
+            assert planning() == {effort}
+
+
+def test_blocks_of_rows_are_planned_like_the_grid_when_they_are_needed(planning):
+    for is_temporary, effort in ((False, "FFTW_MEASURE"), (True, "FFTW_ESTIMATE")):
+        grid = Grid(40, is_temporary=is_temporary)
+        grid.padded[...] = 0.0
+        planning()
+        grid.filter_padded(np.ones(grid.spectral_shape))
+        assert planning() == set()
+        grid.filter_padded(np.ones(grid.spectral_shape), [1, 2])
+        assert planning() == {effort}
+
+
+@pytest.mark.parametrize(("points", "interpolation"), [(30, 30), (30, 60)])
+def test_a_free_scene_measures_no_plans(planning, tmp_path, points, interpolation):
+    """It makes one transform of each of its grids."""
+    np.save(tmp_path / "map.npy", SelfAffine(cutoff=0.1).heights(2 * points)[:points, :points])
+    planning()
+    build_free_scene(SelfAffine(cutoff=0.2), Power(n=1), points)
+    surface = FileSurface(path=str(tmp_path / "map.npy"), length=1.0, periodic=False)
+    build_free_scene(surface, Power(n=1), interpolation)
+    assert map_spectrum(surface.mirrored()) is not None
+    assert planning() == {"FFTW_ESTIMATE"}
+    build_scene(SelfAffine(cutoff=0.2), Power(n=1), points)
+    assert planning() == {"FFTW_MEASURE"}
 
 
 @pytest.mark.usefixtures("small_plans_measured")

@@ -462,7 +462,7 @@ def test_runs_in_two_threads_keep_their_plans_apart(tmp_path, monkeypatch):
 
     def plan_in_other():
         plans.plan_with(other)
-        plans.planned_transforms(lambda fftw: fftw(values, values.copy()))
+        plans.planned_transforms(lambda fftw: fftw(values, values.copy()), 97)
 
     try:
         plans.plan_with(one)
@@ -471,7 +471,7 @@ def test_runs_in_two_threads_keep_their_plans_apart(tmp_path, monkeypatch):
         thread.join()
         assert plans.read_wisdom(one) is None
         assert plans.read_wisdom(other)
-        plans.planned_transforms(lambda fftw: fftw(values, values.copy()))
+        plans.planned_transforms(lambda fftw: fftw(values, values.copy()), 97)
     finally:
         plans.plan_with(None)
     assert plans.read_wisdom(one)

@@ -45,7 +45,7 @@ class Grid:
     length_y: float = 0.0
     """Side along y [m]; 0 stands for the points along y times the spacing along x."""
     is_temporary: bool = False
-    """Whether it makes few transforms, for which measuring a plan would take longer."""
+    """Whether it makes so few transforms that measuring their plans takes longer than it saves."""
 
     def __post_init__(self) -> None:
         points_y = self.points_y or self.points if self.dimension == 2 else 1

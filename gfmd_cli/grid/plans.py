@@ -1,9 +1,9 @@
 """Plans of Fourier transforms: measured once and stored, or estimated.
 
-To measure is to compare hundreds of plans, which takes a tenth of a second or more for each
-transform, also where the transform itself takes microseconds. An estimated plan is found at once;
-with estimated plans, a solve on a large grid takes up to 30 % longer (docs/performance.md).
-Estimated plans are the same in every run without being stored.
+Measuring compares hundreds of plans, which takes 0.1 s or more for each transform, even for one
+that takes microseconds. An estimated plan is found at once; with estimated plans, a solve on a
+large grid takes up to 30 % longer (docs/performance.md). Estimated plans are the same in every run
+without being stored.
 
 FFTW's wisdom (what it has measured) is stored as text: beside the study of a run, so that a resumed
 run uses the plans of the first one, and in the user's cache for other runs. One process at a time
@@ -42,9 +42,9 @@ Planner = Callable[..., Any]
 Wisdom = dict[str, list[str]]
 """Texts in double and in single precision by the key of a group of transforms."""
 PLANNING_SECONDS = (30.0, 1e-6)  # time limit of a search for a plan: constant, and per grid point
-MIN_MEASURED_POINTS = 2**17  # of a field; plans of smaller ones are estimated
-"""Solves with 256 points a side take up to 7 % longer, smaller ones as long as with measured plans,
-and planning takes half the time: docs/performance.md, `scripts/plan_times.py`."""
+MIN_MEASURED_POINTS = 2**17  # of a grid; 2^16 to 2^18 were tried
+"""Solves on 256^2 and 400^2 take up to 7 % longer than with measured plans, with 2^18 up to 15 %.
+docs/performance.md and `scripts/plan_times.py` have the time of planning."""
 MAX_WISDOM_BYTES = 2**24  # of a file of wisdom
 MAX_CACHED_LINES = 20000  # of wisdom; a new size adds some 50 and reads and writes all
 KEY = re.compile("[0-9a-f]{16}")
@@ -141,14 +141,14 @@ def plans() -> str:
     if are_estimated():
         return "estimated"
     known = read_wisdom(_planning.get().folder or cache_folder())
-    return f"measured {_digest(known) if known else ''}".strip()
+    return f"measured {_digest(known)}" if known else "estimated"
 
 
-def planned_transforms(make: Callable[[Planner], T], size: int = 0) -> T:
+def planned_transforms(make: Callable[[Planner], T], size: int) -> T:
     """The transforms that `make` plans. Plans that are not known yet are measured and stored.
 
-    `size` is the number of points of the field that is transformed. Plans of small fields are
-    estimated; the time limit of a measurement increases with the size.
+    Below `MIN_MEASURED_POINTS` they are estimated. The time limit of a measurement increases with
+    the number of grid points, `size`; 0 stands for plans that are always estimated.
     """
     is_estimated = are_estimated() or size < MIN_MEASURED_POINTS
     effort = "FFTW_ESTIMATE" if is_estimated else "FFTW_MEASURE"

@@ -41,10 +41,13 @@ class RowTransforms:
     ----------
     values, lines : the rows as real values and as coefficients
     rows : the threads, and the rows that each transforms
+    size : as of `planned_transforms`
     """
 
-    def __init__(self, values: Field, lines: Modes, rows: LocalRows, fftw: Planner) -> None:
-        self.values, self.lines, self.pool = values, lines, rows.pool
+    def __init__(
+        self, values: Field, lines: Modes, rows: LocalRows, fftw: Planner, size: int
+    ) -> None:
+        self.values, self.lines, self.pool, self.size = values, lines, rows.pool, size
         arrays = [(values[a:b], lines[a:b]) for a, b in rows.parts]
         self._forward = [fftw(v, c, (1,), "FFTW_FORWARD").execute for v, c in arrays]
         self._backward = [fftw(c, v, (1,), "FFTW_BACKWARD").execute for v, c in arrays]
@@ -68,7 +71,7 @@ class RowTransforms:
         def make(fftw: Planner) -> list[Any]:
             return [fftw(real, block, (1,), "FFTW_FORWARD") for _ in range(self._count)]
 
-        return planned_transforms(make)
+        return planned_transforms(make, self.size)
 
     def backward(self) -> None:
         """Transform all rows back."""
@@ -219,13 +222,14 @@ class FieldTransforms:
         self._transposition = transposition
         self._arrays = self.lines, self.work, memory[-1]
 
+        size = len(self.work) * points if is_measured else 0
+
         def make(fftw: Planner) -> tuple[RowTransforms, ColumnTransforms]:
             length = padded_rows or len(self.work)
             along_columns = ColumnTransforms(self.work, rows, fftw, length)
-            return RowTransforms(self.values, self.lines, rows, fftw), along_columns
+            return RowTransforms(self.values, self.lines, rows, fftw, size), along_columns
 
-        transforms = planned_transforms(make, self.values.size if is_measured else 0)
-        self.along_rows, self.along_columns = transforms
+        self.along_rows, self.along_columns = planned_transforms(make, size)
 
     def to_columns(self, blocks: Sequence[int] | None = None) -> None:
         """`work` <- `values` transformed along x; `blocks` as in `RowTransforms.forward`."""

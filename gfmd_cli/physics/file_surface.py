@@ -184,7 +184,8 @@ class FileSurface(RigidSurface):
             return monotone(heights, grid.whole_shape, grid.own, centred=self.is_centred)
         if self.is_centred:
             heights = at_centres(heights, grid.whole_shape)
-        own_grid = Grid(heights.shape[-1], heights.ndim, points_y=heights.shape[0])
+        shape = heights.shape
+        own_grid = Grid(shape[-1], heights.ndim, points_y=shape[0], is_temporary=True)
         return own_grid.resample(heights, grid)
 
     def _is_reflected(self) -> bool:

@@ -207,9 +207,10 @@ def _mirrored(
     own_points = (surface.smallest_grid_y(), surface.smallest_grid())
     mirrored_surface = surface.mirrored()
     if mirrored_surface is None or own_points == (grid.points_y, grid.points):
-        own, height = sample(surface, grid.points, grid.points_y, ranks)
+        own, height = sample(surface, grid.points, grid.points_y, ranks, is_temporary=True)
         return doubled, _reflected(own, height, doubled), surface.void(grid)
-    _, mirrored = sample(mirrored_surface, doubled.points, doubled.points_y, ranks)
+    shape = doubled.points, doubled.points_y
+    _, mirrored = sample(mirrored_surface, *shape, ranks, is_temporary=True)
     void = mirrored_surface.void(doubled)
     return doubled, mirrored, None if void is None else _on_map(doubled, void, grid)
 

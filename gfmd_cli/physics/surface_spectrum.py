@@ -1,6 +1,6 @@
 """Power spectral density of a surface in bands of wavenumber, with the self-affine fit."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import nan, pi, prod
 
 import numpy as np
@@ -80,8 +80,8 @@ def map_spectrum(surface: RigidSurface) -> Spectrum | None:
     tapered = surface.tapered_map()
     if tapered is None:
         return None
-    grid, heights = sample(tapered, tapered.smallest_grid())
-    scene = reduce_scene(replace(grid, is_temporary=True), heights, HalfSpace())
+    grid, heights = sample(tapered, tapered.smallest_grid(), is_temporary=True)
+    scene = reduce_scene(grid, heights, HalfSpace())
     return spectrum(scene.shells, scene.grid.sides, scene.grid.whole_shape)
 
 

@@ -3,6 +3,7 @@
 Each class is one `kind` of [surface] in the run spec. Heights h increase towards the elastomer.
 """
 
+from dataclasses import replace
 from typing import Annotated
 
 import numpy as np
@@ -21,17 +22,22 @@ Surface = Annotated[SelfAffine | Indenter | FileSurface, Key(discriminator="kind
 
 
 def sample(
-    surface: RigidSurface, points: int, points_y: int = 0, ranks: Ranks | None = None
+    surface: RigidSurface,
+    points: int,
+    points_y: int = 0,
+    ranks: Ranks | None = None,
+    *,
+    is_temporary: bool = False,
 ) -> tuple[Grid, Field]:
     """Make the grid of so many points on the cell of a surface, and the heights [m] on it.
 
     `ranks` are the processes that share large grids. By default the number of points along y
-    makes the pixels square.
+    makes the pixels square. `is_temporary` says whether the grid serves for little else.
 
     Raises InputError where the grid does not resolve the surface, the surface is flat, or its
     heights overflow.
     """
-    whole = surface.grid(points, points_y)
+    whole = replace(surface.grid(points, points_y), is_temporary=is_temporary)
     surface.check_resolved(points, whole.points_y)
     grid = create_grid(whole, ranks)
     with np.errstate(over="ignore", invalid="ignore"):  # refused below
