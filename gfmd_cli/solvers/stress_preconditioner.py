@@ -44,8 +44,7 @@ class StressPreconditioner:
         self.map, self.cell = contact.grid, _enlarged(contact.grid)
         elastomer, unit = contact.compliance.elastomer, contact.compliance.unit
         self.stiffness = elastomer.stiffness(self.cell.wavenumber(), self.map.length) / unit
-        self.single = self.cell.in_single()
-        padded = self.single.as_rows(self.single.padded)
+        padded = self.cell.as_rows(self.cell.padded)
         self.values: SingleField = padded[:, : self.cell.points]
         self.stress = np.zeros(self.values.shape, np.float32)
         self.response = np.zeros_like(self.stress)  # K times the last direction
@@ -53,10 +52,10 @@ class StressPreconditioner:
         self.cycles = 0
         if has_coarser_level(self.cell):
             periodic = Contact(self.cell, np.empty(0), self.stiffness, contact.pressure)
-            self.multigrid = Multigrid(periodic, self.single)
+            self.multigrid = Multigrid(periodic, self.cell)
             self.cycles = CYCLES[largest_growth(periodic) > MAX_GROWTH]
         pairs = (1 + self.cycles) * self.cell.size / self.map.size
-        self.transforms = self.single.pair_cost * pairs
+        self.transforms = self.cell.pair_cost * pairs
         """Cost of `apply` in transforms of the size of the map, without the V-cycle."""
 
     def apply(
@@ -70,7 +69,7 @@ class StressPreconditioner:
         held = contact_state >= threshold
         self._enlarge(np.where(held, displacement, 0.0).astype(np.float32), self.values)
         self._enlarge(contact_state, self.cell.rows.interior(self.contact_state))
-        self.single.filter_padded(self.stiffness)
+        self.cell.filter_padded(self.stiffness)
         self.stress[...] = self.values
         self._relax(threshold)
         own = self.cell.gather_rows(self.stress[:, : self.map.points], self.map.row_span)
@@ -82,7 +81,7 @@ class StressPreconditioner:
         last_curvature = 0.0
         for _ in range(self.cycles):
             descent, coupling = self.multigrid.apply(*fields)
-            curvature = self.single.filter_padded(self.stiffness)
+            curvature = self.cell.filter_padded(self.stiffness)
             if last_curvature > 0:
                 beta = -coupling / last_curvature
                 self.values += np.float32(beta) * self.response
@@ -103,8 +102,8 @@ class StressPreconditioner:
 
 
 def _enlarged(grid: Grid) -> Grid:
-    """The periodic cell: pixels of the same size, at least `PADDING` times as many a side."""
+    """The periodic cell in single precision, of at least `PADDING` times as many pixels a side."""
     shape = [UNIT * fast_length(ceil(PADDING * points / UNIT)) for points in grid.whole_shape]
     sides = [n * spacing for n, spacing in zip(shape, grid.spacings, strict=True)]
-    cell = replace(grid, points=shape[-1], length=sides[-1])
+    cell = replace(grid, points=shape[-1], length=sides[-1], precision="single")
     return cell if grid.dimension == 1 else replace(cell, points_y=shape[0], length_y=sides[0])
