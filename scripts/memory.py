@@ -52,6 +52,7 @@ CASES = {
     '`"polonsky-keer"`': ["solver.kind=polonsky-keer"],
     "`[accuracy]`": ["accuracy.mean_gap=0.1"],
     "a free boundary": ["grid.boundary=free"],
+    "a free boundary, n = 1.5": ["grid.boundary=free", "elastomer.n=1.5"],
     "a slab": ["elastomer={kind='slab', thickness=0.05}"],
     "`load.contact_area`": ["load={contact_area=0.1}"],
     "one stored field": ["output.fields=['u']"],

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from gfmd_cli.grid.fft_grid import Grid
+from gfmd_cli.maps.map_preparation import mirror
 from gfmd_cli.physics import scenes
 from gfmd_cli.physics.discretisation_error import MAX_REPETITIONS
 from gfmd_cli.physics.elastomers import Power
@@ -13,7 +14,7 @@ from gfmd_cli.physics.file_surface import FileSurface
 from gfmd_cli.physics.indenters import Parabola, Wave
 from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.physics.surfaces import sample
-from gfmd_cli.physics.waves import radial_power, texture
+from gfmd_cli.physics.waves import mirrored_power, radial_power, texture
 
 
 def waves(grid, *pairs):
@@ -210,3 +211,17 @@ def test_waves_are_counted_on_the_coarsest_grid_that_has_them_all(
     assert scene.delta_sigma == pytest.approx(all_points.delta_sigma, rel=1e-12)
     for one, other in zip(astuple(scene.shells), astuple(all_points.shells), strict=True):
         np.testing.assert_allclose(one, other, rtol=1e-9)
+
+
+@pytest.mark.parametrize("shape", [(12, 16), (9, 15), (20,)])
+def test_waves_of_mirrored_heights_are_those_of_twice_the_cell(shape):
+    heights = np.random.default_rng(4).normal(size=shape)
+    heights -= heights.mean()
+    grid = Grid(shape[-1], len(shape), length=2.0, points_y=shape[0], length_y=3.0)
+    m, power, modes = mirrored_power(grid, heights)
+    cell = Grid(2 * shape[-1], len(shape), length=4.0, points_y=2 * shape[0], length_y=6.0)
+    expected = radial_power(cell, mirror(heights))
+    np.testing.assert_allclose(2 * m, expected[0], rtol=1e-14)
+    np.testing.assert_allclose(power, expected[1], rtol=1e-9)
+    np.testing.assert_array_equal(modes, expected[2])
+    assert power.sum() == pytest.approx(np.mean(heights**2), rel=1e-12)

@@ -331,6 +331,13 @@ class Grid:
         """A grid of fewer points on the same cell."""
         return replace(self, points=shape[-1], points_y=shape[0])
 
+    def doubled(self) -> "Grid":
+        """A temporary grid of twice the points along each axis, on a cell of twice the sides."""
+        along_x = replace(self, points=2 * self.points, length=2 * self.length, is_temporary=True)
+        if self.dimension == 1:
+            return along_x
+        return replace(along_x, points_y=2 * self.points_y, length_y=2 * self.length_y)
+
     def cut(self, symbol: Field, target: "Grid") -> Field:
         """The values of a symbol at the wavenumbers of a coarser grid."""
         m_y = np.fft.ifftshift(np.arange(target.points_y) - target.points_y // 2)

@@ -146,7 +146,7 @@ class FreeContact(Contact):
 
         Its stress K h is that of full contact, which is not defined for a map with borders.
         """
-        grid = doubled_grid(self.grid)
+        grid = self.grid.doubled()
         elastomer, unit = self.compliance.elastomer, self.compliance.unit
         k = elastomer.stiffness(grid.wavenumber(), grid.length) / unit
         mask = None if self.may_touch is None else mirror(self.may_touch)
@@ -182,46 +182,33 @@ def build_free_scene(
     Raises InputError as `build_scene`, and where the elastomer has no compliance that decays.
     """
     grid = create_grid(replace(surface.grid(points, points_y), threads=threads), ranks)
-    doubled, mirrored, void = _mirrored(surface, grid, ranks)
-    scene = reduce_scene(doubled, mirrored, elastomer)
+    height, void = _heights(surface, grid, ranks)
+    scene = reduce_scene(grid, height, elastomer, is_mirrored=True)
     compliance = FreeCompliance(elastomer, grid, scene.delta_sigma / scene.h_std)
     return replace(
         scene,
-        grid=grid,
-        height=_on_map(doubled, scene.height, grid),
         stiffness=np.empty(0),
         may_touch=touchable(void, grid),
         contact_type=partial(FreeContact, compliance=compliance),
     )
 
 
-def _mirrored(
-    surface: RigidSurface, grid: Grid, ranks: Ranks | None
-) -> tuple[Grid, Field, Mask | None]:
-    """Twice the grid of a map, the mirrored heights on it, and the points that never touch.
+def _heights(surface: RigidSurface, grid: Grid, ranks: Ranks | None) -> tuple[Field, Mask | None]:
+    """Heights [m] of a map on a grid, and the points that never touch.
 
     A measured map is mirrored before it is interpolated, so that no height on a finer grid lies
-    between those of opposite borders. On its own points no process needs the whole mirrored map.
+    between those of opposite borders.
     """
-    doubled = create_grid(doubled_grid(grid), ranks)
     own_points = (surface.smallest_grid_y(), surface.smallest_grid())
-    mirrored_surface = surface.mirrored()
-    if mirrored_surface is None or own_points == (grid.points_y, grid.points):
-        own, height = sample(surface, grid.points, grid.points_y, ranks, is_temporary=True)
-        return doubled, _reflected(own, height, doubled), surface.void(grid)
-    shape = doubled.points, doubled.points_y
-    _, mirrored = sample(mirrored_surface, *shape, ranks, is_temporary=True)
-    void = mirrored_surface.void(doubled)
-    return doubled, mirrored, None if void is None else _on_map(doubled, void, grid)
-
-
-def _reflected(grid: Grid, values: Field, doubled: Grid) -> Field:
-    """Values at the points of a grid, reflected at its borders, on twice the grid."""
-    rows = np.arange(*doubled.row_span)
-    rows = np.minimum(rows, 2 * grid.points_y - 1 - rows)
-    first = int(rows.min())
-    values = grid.gather_rows(grid.as_rows(values), (first, int(rows.max()) + 1))[rows - first]
-    return np.concatenate([values, values[:, ::-1]], axis=1).reshape(doubled.shape)
+    mirrored = surface.mirrored()
+    if mirrored is None or own_points == (grid.points_y, grid.points):
+        _, height = sample(surface, grid.points, grid.points_y, ranks, is_temporary=True)
+        return height, surface.void(grid)
+    shape = 2 * grid.points, 2 * grid.points_y
+    doubled, heights = sample(mirrored, *shape, ranks, is_temporary=True)
+    void = mirrored.void(doubled)
+    own_void = None if void is None else _on_map(doubled, void, grid)
+    return _on_map(doubled, heights, grid), own_void
 
 
 def _on_map(doubled: Grid, values: Any, grid: Grid) -> Any:
@@ -232,11 +219,3 @@ def _on_map(doubled: Grid, values: Any, grid: Grid) -> Any:
 
 SCENES: dict[str, Callable[..., Scene]] = {"periodic": build_scene, "free": build_free_scene}
 """How a scene is built, by `grid.boundary`."""
-
-
-def doubled_grid(grid: Grid) -> Grid:
-    """A temporary grid of twice the points along each axis, on a cell of twice the sides."""
-    along_x = replace(grid, points=2 * grid.points, length=2 * grid.length, is_temporary=True)
-    if grid.dimension == 1:
-        return along_x
-    return replace(along_x, points_y=2 * grid.points_y, length_y=2 * grid.length_y)

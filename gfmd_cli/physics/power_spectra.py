@@ -13,7 +13,6 @@ import numpy as np
 from gfmd_cli.grid.arrays import Field, row_blocks
 from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.maps.roughness_parameters import autocorrelation, distances
-from gfmd_cli.physics.free_contact import doubled_grid
 from gfmd_cli.physics.persson import bin_edges
 from gfmd_cli.physics.waves import radial_power
 
@@ -54,7 +53,7 @@ def autocorrelations(
     pairs of points of the grid at each displacement.
     """
     step = max(grid.spacings)
-    cell = grid if periodic else doubled_grid(grid)
+    cell = grid if periodic else grid.doubled()
     distance = distances(cell.whole_shape, (spacing / step for spacing in cell.spacings))
     rings = int(0.5 * min(grid.sides) / step + ROUNDING) + 1
     ring = (distance + 0.5 + ROUNDING).astype(np.int64).ravel()  # half rounds up

@@ -15,7 +15,7 @@ from gfmd_cli.physics.indenters import RigidSurface
 from gfmd_cli.physics.linear_elastomer import LinearElastomer
 from gfmd_cli.physics.persson import shells
 from gfmd_cli.physics.surfaces import sample
-from gfmd_cli.physics.waves import radial_power
+from gfmd_cli.physics.waves import mirrored_power, radial_power
 from gfmd_cli.units import SCALE_RANGE
 
 
@@ -80,11 +80,19 @@ def touchable(void: Mask | None, grid: Grid) -> Mask | None:
 
 
 def reduce_scene(
-    grid: Grid, height: Field, elastomer: LinearElastomer, shape: Shape | None = None
+    grid: Grid,
+    height: Field,
+    elastomer: LinearElastomer,
+    shape: Shape | None = None,
+    *,
+    is_mirrored: bool = False,
 ) -> Scene:
     """Reduce heights [m], which are overwritten, and stiffness to the scales of the surface.
 
-    `shape` is that of a grid of every 2nd, 4th, ... point that has all waves of the surface, too.
+    Parameters
+    ----------
+    shape : of a grid of every 2nd, 4th, ... point that has all waves of the surface, too
+    is_mirrored : whether the waves are those of the heights mirrored to twice the sides of the cell
     """
     blocks = [height[rows] for rows in row_blocks(height)]
     sums, highest, lowest = zip(*((b.sum(), b.max(), b.min()) for b in blocks), strict=True)
@@ -99,7 +107,10 @@ def reduce_scene(
     for block in blocks:
         block *= 1 / rms
     stiffness, stiffest = _stiffness(grid, elastomer)
-    m, power, modes = radial_power(*_thinned(grid, height, shape or grid.whole_shape))
+    if is_mirrored:
+        m, power, modes = mirrored_power(grid, height)
+    else:
+        m, power, modes = radial_power(*_thinned(grid, height, shape or grid.whole_shape))
     q = m * (2 * np.pi / grid.length)
     k = elastomer.stiffness(q, grid.length)
     unit = elastomer.unit_stiffness(q, grid.length)

@@ -4,6 +4,7 @@ from math import inf, prod, sqrt
 from typing import NamedTuple
 
 import numpy as np
+from scipy.fft import dctn
 
 from gfmd_cli.grid.arrays import BLOCK_POINTS, Field, Mask, Modes, row_blocks
 from gfmd_cli.grid.fft_grid import Grid
@@ -62,6 +63,35 @@ def radial_power(grid: Grid, height: Field) -> tuple[Field, Field, Field]:
     of shape (sums,).
     """
     return _by_wavenumber(grid, _power(grid, grid.forward_into_work(height)))
+
+
+def mirrored_power(grid: Grid, height: Field) -> tuple[Field, Field, Field]:
+    """`radial_power` of heights that are mirrored to twice the sides of their grid.
+
+    L is the side of the grid itself. Up to phases, the coefficients are those of a discrete cosine
+    transform of type II of the heights (Makhoul, IEEE Trans. Acoust. Speech Signal Process. 28, 27,
+    1980). Processes that share the grid transform the mirrored heights instead.
+    """
+    doubled = grid.doubled()
+    if grid.whole:
+        power = np.atleast_2d(dctn(height, type=2))
+        power *= power
+        power[1:] *= 2.0  # of q_y and -q_y
+        power[:, 1:] *= 2.0
+        power[0, 0] = 0.0
+        m, power, count = _by_wavenumber(doubled, power)
+    else:
+        m, power, count = radial_power(doubled, _reflected(grid, height, doubled))
+    return 0.5 * m, power, count
+
+
+def _reflected(grid: Grid, values: Field, doubled: Grid) -> Field:
+    """Values at the points of a grid, reflected at its borders, on twice the grid."""
+    rows = np.arange(*doubled.row_span)
+    rows = np.minimum(rows, 2 * grid.points_y - 1 - rows)
+    first = int(rows.min())
+    values = grid.gather_rows(grid.as_rows(values), (first, int(rows.max()) + 1))[rows - first]
+    return np.concatenate([values, values[:, ::-1]], axis=1).reshape(doubled.shape)
 
 
 def _power(grid: Grid, modes: Modes) -> Field:

@@ -13,7 +13,6 @@ import numpy as np
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.maps.map_preparation import mirror
 from gfmd_cli.physics.approach import approach
-from gfmd_cli.physics.free_contact import doubled_grid
 from gfmd_cli.physics.observables import changed_fractions, gap_histogram, stress_histogram
 from gfmd_cli.physics.patches import area_distribution
 from gfmd_cli.physics.power_spectra import autocorrelations, spectra
@@ -175,7 +174,7 @@ def _curves(solved: TaskSolution) -> dict[str, dict[str, Field]]:
     units = {"height": scene.h_std, "u": scene.h_std, "sigma": scene.delta_sigma}
     r, means = autocorrelations(grid, fields, periodic=periodic)
     if not periodic:
-        grid, fields = doubled_grid(grid), {name: mirror(field) for name, field in fields.items()}
+        grid, fields = grid.doubled(), {name: mirror(field) for name, field in fields.items()}
     q, waves, powers = spectra(grid, fields)
     powers = {name: power * units[name] ** 2 for name, power in powers.items()}
     return {
