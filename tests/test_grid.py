@@ -390,14 +390,14 @@ def test_blocks_of_rows_are_planned_like_the_grid_when_they_are_needed(planning)
         assert planning() == {effort}
 
 
-@pytest.mark.parametrize(("points", "interpolation"), [(30, 30), (30, 60)])
-def test_a_free_scene_measures_no_plans(planning, tmp_path, points, interpolation):
+@pytest.mark.parametrize(("points", "grid_points"), [(30, 30), (30, 60)])
+def test_a_free_scene_measures_no_plans(planning, tmp_path, points, grid_points):
     """It makes one transform of each of its grids."""
     np.save(tmp_path / "map.npy", SelfAffine(cutoff=0.1).heights(2 * points)[:points, :points])
     planning()
     build_free_scene(SelfAffine(cutoff=0.2), Power(n=1), points)
     surface = FileSurface(path=str(tmp_path / "map.npy"), length=1.0, periodic=False)
-    build_free_scene(surface, Power(n=1), interpolation)
+    build_free_scene(surface, Power(n=1), grid_points)
     assert map_spectrum(surface.mirrored()) is not None
     assert planning() == {"FFTW_ESTIMATE"}
     build_scene(SelfAffine(cutoff=0.2), Power(n=1), points)

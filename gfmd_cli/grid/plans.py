@@ -1,9 +1,9 @@
 """Plans of Fourier transforms: measured once and stored, or estimated.
 
-Measuring compares hundreds of plans, which takes 0.1 s or more for each transform, even for one
-that takes microseconds. An estimated plan is found at once; with estimated plans, a solve on a
-large grid takes up to 30 % longer (docs/performance.md). Estimated plans are the same in every run
-without being stored.
+Measuring compares hundreds of plans, which takes some tenths of a second for each grid and
+precision, however short the transforms are. An estimated plan is found at once; with estimated
+plans, a solve on a large grid takes up to 30 % longer (docs/performance.md). Estimated plans are
+the same in every run without being stored.
 
 FFTW's wisdom (what it has measured) is stored as text: beside the study of a run, so that a resumed
 run uses the plans of the first one, and in the user's cache for other runs. One process at a time
@@ -42,9 +42,11 @@ Planner = Callable[..., Any]
 Wisdom = dict[str, list[str]]
 """Texts in double and in single precision by the key of a group of transforms."""
 PLANNING_SECONDS = (30.0, 1e-6)  # time limit of a search for a plan: constant, and per grid point
-MIN_MEASURED_POINTS = 2**17  # of a grid; 2^16 to 2^18 were tried
-"""Solves on 256^2 and 400^2 take up to 7 % longer than with measured plans, with 2^18 up to 15 %.
-docs/performance.md and `scripts/plan_times.py` have the time of planning."""
+MIN_MEASURED_POINTS = 2**17  # of a grid; plans of smaller ones are estimated
+"""A compromise. On 256^2 and 400^2, solves take 3 to 13 % longer than if all plans were measured,
+and planning takes less time by that of 57 to 105 solves. With 2^16 these are -1 to 6 % and 30 to
+77, with 2^18 0 to 15 % and 52 to 144 (two runs of `scripts/plan_times.py --points 256 400
+--measured-from 0 65536 131072 262144 --repeats 25`)."""
 MAX_WISDOM_BYTES = 2**24  # of a file of wisdom
 MAX_CACHED_LINES = 20000  # of wisdom; a new size adds some 50 and reads and writes all
 KEY = re.compile("[0-9a-f]{16}")

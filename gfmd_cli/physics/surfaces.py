@@ -32,7 +32,7 @@ def sample(
     """Make the grid of so many points on the cell of a surface, and the heights [m] on it.
 
     `ranks` are the processes that share large grids. By default the number of points along y
-    makes the pixels square. `is_temporary` says whether the grid serves for little else.
+    makes the pixels square. `is_temporary` is that of the grid.
 
     Raises InputError where the grid does not resolve the surface, the surface is flat, or its
     heights overflow.
