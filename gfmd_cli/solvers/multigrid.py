@@ -28,8 +28,9 @@ largest. The penalty does not increase it, because it acts on waves for which th
 The weight of a correction may be any positive number.
 """
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from functools import partial
 from itertools import pairwise, starmap
 from math import inf, prod
 from typing import Any
@@ -79,6 +80,13 @@ STEEPEST = 4.5  # exponent above which the levels limit the growth of k(q): `_wi
 COARSEST_STEP_PAIRS = 4  # of smoothing steps on the coarsest level
 """With 1, 2 and 8, 4 % fewer to 5 % more:
 `multigrid.COARSEST_STEP_PAIRS 1 2 8 --exponents 1 2 3 4`."""
+LONG_WAVE_FRACTION = 0.02  # largest number of points over that of the grid; an eighth a side
+"""With 0.07 and 0.005: `multigrid.LONG_WAVE_FRACTION 0.07 0.005 --points 1024 --exponents 0.5 1
+1.5`: TODO."""
+LONG_WAVE_STEPS = 2  # of conjugate gradients
+MIN_LONG_WAVE_POINTS = 128  # of the level, along the shorter side; on smaller ones no time is saved
+MAX_LONG_WAVE_GROWTH = 3.0  # of k(q) per octave, up to which long waves converge more slowly
+LONG_WAVE_PENALTY = (-0.4, 0.5), (1.0, 0.0)  # factor of the penalty, as lines (a, b) likewise
 PENALTY_UNIT = 1.0 / 64  # of the integers in `_CoarseLevel.penalty`
 
 
@@ -206,6 +214,19 @@ def _is_half(coarse: Shape, fine: Shape) -> bool:
     return all(2 * few == many for few, many in zip(coarse, fine, strict=True))
 
 
+def _level_of_long_waves(contact: Contact, levels: list[Level]) -> tuple[int, Grid] | None:
+    """Number and grid of the level on which `_LongWaves` solves; None where this does not pay."""
+    grid = contact.grid
+    small = [i for i, t in enumerate(levels) if prod(t.shape) <= LONG_WAVE_FRACTION * grid.size]
+    if not small or max(level.growth for level in levels) > MAX_LONG_WAVE_GROWTH:
+        return None
+    level = levels[small[0]]
+    grid = replace(grid.coarser(level.shape), precision="single", is_temporary=True)
+    has_same_rows = grid.rows.is_whole == level.rows.is_whole
+    is_large = min(level.shape) >= MIN_LONG_WAVE_POINTS
+    return (small[0], grid) if is_large and has_same_rows else None
+
+
 class _CoarseLevel:
     """The fields of a level below the finest one, and the steps of the cycle on it."""
 
@@ -265,6 +286,85 @@ class _CoarseLevel:
             self.smooth(None, self.y, coarser)
 
 
+def _descend(levels: list[_CoarseLevel]) -> None:
+    """Smooth and restrict, from the first of some levels to the last."""
+    for finer, level in pairwise(levels):
+        is_squared = finer.operator.is_squared
+        if is_squared:
+            finer.smooth(None, finer.y)
+        fields = (finer.rhs, finer.operator, finer.penalty, finer.y, not is_squared)
+        level.restrict(kernels.residual, *fields)
+
+
+def _ascend(levels: list[_CoarseLevel]) -> None:
+    """Correct and smooth, from the last of some levels to the first."""
+    for coarser, level in pairwise(levels[::-1]):
+        level.post_smooth(coarser)
+
+
+def _v_cycle(levels: list[_CoarseLevel]) -> None:
+    """The V-cycle on some levels, the last of which is the coarsest."""
+    _descend(levels)
+    last = levels[-1]
+    last.smooth(None, last.y)
+    for _ in range(COARSEST_STEP_PAIRS):
+        last.smooth(last.y, last.x)
+        last.smooth(last.x, last.y)
+    _ascend(levels)
+
+
+class _LongWaves:
+    """Conjugate gradients for K itself and the penalty on one coarse level.
+
+    The V-cycle from this level on is the preconditioner. `grid` has the points of the level.
+    """
+
+    def __init__(self, contact: Contact, grid: Grid, level: Level, fields: list[_CoarseLevel]):
+        self.grid, self.rows, self.levels = grid, level.rows, fields
+        self.stiffness = contact.grid.cut(contact.stiffness, grid)
+        self.stiffness *= contact.grid.size / grid.size / level.scale
+        laplacian = dict.fromkeys(("centre", "y", "x", "corner"), kernels.ZERO)
+        scale = level.operator.penalty_scale * _at_growth(LONG_WAVE_PENALTY, level.growth)
+        self.penalty_alone = level.operator._replace(
+            **laplacian, is_squared=False, penalty_scale=np.float32(scale)
+        )
+        zeros = partial(level.rows.empty_with_halo, grid.points, dtype=np.float32)
+        self.direction, self.change = zeros(), zeros()
+
+    def solve(self) -> None:
+        """Compute `y` of the level from its `rhs`, which is overwritten by the residual."""
+        first = self.levels[0]
+        fields = first.y, first.rhs, self.direction, self.change
+        z, residual, direction, change = map(self.rows.interior, fields)
+        result, curvature = np.zeros_like(z), 0.0
+        for _ in range(LONG_WAVE_STEPS):
+            _v_cycle(self.levels)
+            beta = self.grid.dot(z, change) / curvature if curvature else 0.0
+            direction *= np.float32(beta)
+            direction += z
+            self._compute_change()
+            curvature = -self.grid.dot(direction, change)
+            if not curvature > 0:
+                break
+            length = np.float32(self.grid.dot(direction, residual) / curvature)
+            result += length * direction
+            residual += length * change
+            self.rows.exchange_halo(first.rhs)
+        z[...] = result
+        self.rows.exchange_halo(first.y)
+
+    def _compute_change(self) -> None:
+        """`change` <- that of the residual by the direction, minus K and the penalty times it."""
+        values = self.grid.padded[:, : self.grid.points]
+        values[...] = self.rows.interior(self.direction)
+        self.grid.filter_padded(self.stiffness)
+        np.negative(values, out=self.rows.interior(self.change))
+        self.rows.exchange_halo(self.direction)
+        penalty = self.penalty_alone, self.levels[0].penalty
+        fields = self.change, *penalty, self.direction, False, self.change
+        self.rows.run(kernels.residual, *fields, first=self.rows.halo)
+
+
 class Multigrid:
     """The preconditioner of one contact."""
 
@@ -277,6 +377,12 @@ class Multigrid:
         self.rows, self.operator = finest.rows, finest.operator
         self.scale = np.float32(1.0 / finest.scale)
         self.coarse = list(starmap(_CoarseLevel, pairwise(levels)))
+        self.finer = self.coarse[:1]
+        self.solve_rest: Callable[[], None] = partial(_v_cycle, self.coarse)
+        if (found := _level_of_long_waves(contact, levels)) is not None:
+            number, level_grid = found
+            self.finer, rest = self.coarse[:number], self.coarse[number - 1 :]
+            self.solve_rest = _LongWaves(contact, level_grid, levels[number], rest).solve
 
     def apply(
         self, sigma: Field, contact_state: ContactState, threshold: int, change: Field
@@ -290,24 +396,10 @@ class Multigrid:
         fields = (self.rows.with_halo(sigma), contact_state, threshold, self.operator)
         # one smoothing step from zero on the finest level, and the restriction of the residual
         first.restrict(kernels.first_residual, *fields)
-        self.descend()  # pre-smoothing
-        for coarser, level in pairwise(self.coarse[::-1]):
-            level.post_smooth(coarser)
+        _descend(self.finer)
+        self.solve_rest()
+        _ascend(self.finer)
         # correction and one smoothing step on the finest level, and the sums
         arrays = (*fields, *first.correction(), self.scale, change, self.z)
         slope, z_change = self.rows.sums(2, kernels.last_smooth, *arrays, first=self.rows.halo)
         return float(slope), float(z_change)
-
-    def descend(self) -> None:
-        """Smooth and restrict, from the finest of the coarse levels to the coarsest."""
-        for finer, level in pairwise(self.coarse):
-            is_squared = finer.operator.is_squared
-            if is_squared:
-                finer.smooth(None, finer.y)
-            fields = (finer.rhs, finer.operator, finer.penalty, finer.y, not is_squared)
-            level.restrict(kernels.residual, *fields)
-        last = self.coarse[-1]
-        last.smooth(None, last.y)
-        for _ in range(COARSEST_STEP_PAIRS):
-            last.smooth(last.y, last.x)
-            last.smooth(last.x, last.y)

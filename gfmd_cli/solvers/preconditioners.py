@@ -18,7 +18,7 @@ from gfmd_cli.solvers import preconditioner_kernels as kernels
 from gfmd_cli.solvers.contact_state import ContactState
 from gfmd_cli.solvers.multigrid import Multigrid, has_coarser_level
 
-V_CYCLE_EXPONENT = {1: 2.7, 2: 0.7}
+V_CYCLE_EXPONENT = {1: 2.7, 2: 0.45}
 """Exponent of k(q) above which the V-cycle is faster than the Green's function, by the dimension.
 
 Measured. On lines a transform is cheap: at n = 3 both take as long at 8192 points. At n = 4 the
