@@ -14,7 +14,7 @@ from gfmd_cli.maps.map_warnings import unresolved
 from gfmd_cli.maps.roughness_parameters import MAP_NAMES, PROFILE_NAMES, roughness_parameters
 from gfmd_cli.physics.contact import Scene
 from gfmd_cli.physics.elastomers import HalfSpace
-from gfmd_cli.physics.indenters import RigidSurface
+from gfmd_cli.physics.indenters import MAX_POINTS, RigidSurface
 from gfmd_cli.physics.persson import Persson
 from gfmd_cli.physics.scenes import build_scene
 from gfmd_cli.physics.self_affine import SelfAffine
@@ -93,6 +93,7 @@ def summarise(surface: RigidSurface, points: int = 0) -> SurfaceSummary:
     Raises InputError for an unfit surface.
     """
     repeated = surface.within("periodic")
+    repeated.check_resolved(MAX_POINTS, MAX_POINTS)
     smallest = repeated.smallest_grid()
     # modes at the Nyquist wavenumber are counted twice
     points = smallest if surface.is_map else max(points, 2 * smallest)
