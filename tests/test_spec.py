@@ -62,7 +62,7 @@ def test_loads_that_agree_in_fourteen_digits_are_one_task(read):
     assert len(plan(read(("[0.1, 1.0]", "[0.1, 0.10000000000000002]")))) == 1
 
 
-@pytest.mark.parametrize("length_y", ["1e+100", "1e-100"])
+@pytest.mark.parametrize("length_y", ["1e+30", "1e-30"])
 @pytest.mark.parametrize("points_y", ["", "\npoints_y = 64"])
 def test_a_cell_of_too_different_sides_is_refused(read, length_y, points_y):
     spec = read(
@@ -73,9 +73,9 @@ def test_a_cell_of_too_different_sides_is_refused(read, length_y, points_y):
         plan(spec)
 
 
-@pytest.mark.parametrize("length", ["1e-300", "1e101"])
+@pytest.mark.parametrize("length", ["1e-31", "1e31"])
 @pytest.mark.parametrize("key", ["length", "length_y"])
-def test_lengths_whose_squares_are_no_numbers_are_refused(read, key, length):
+def test_lengths_out_of_range_are_refused(read, key, length):
     with pytest.raises(InputError, match=rf"surface\.{key}: must be (less|greater) than or equal"):
         read(("cutoff = 0.05", f"cutoff = 0.05\n{key} = {length}"))
 
