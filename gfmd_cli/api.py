@@ -369,7 +369,8 @@ def _read(spec: Path | str | Tables, overrides: tuple[str, ...] = ()) -> tuple[S
             raise InputError("overrides need a spec in a file; change the dictionary")
         tables = _without_numpy(spec)
         return read_tables(tables), json.dumps(tables, indent=1, default=str)
-    if isinstance(overrides, str):
+    is_sequence = isinstance(overrides, tuple | list)
+    if not (is_sequence and all(isinstance(each, str) for each in overrides)):
         raise InputError(f"overrides = {overrides!r}: a tuple or list of strings is needed")
     if not isinstance(spec, Path | str):
         raise InputError(f"spec: a path or a dictionary is needed, not {type(spec).__name__}")

@@ -7,11 +7,13 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, Strict
 
-from gfmd_cli.units import labelled
+from gfmd_cli.units import LENGTH_RANGE, labelled
 
 UNIT = re.compile(r" \[(.*?)\]")
 """Unit of a number in the docstring of its key."""
 Positive = Annotated[float, Field(gt=0)]
+Scale = Annotated[float, Field(ge=LENGTH_RANGE[0], le=LENGTH_RANGE[1])]
+"""A length [m], or a factor of lengths."""
 Seed = Annotated[int, Field(ge=0, lt=2**63)]
 FilePath = Annotated[Path, Strict(False)]
 

@@ -10,6 +10,8 @@ LARGEST_RMS_HEIGHT = 1e-2
 """Largest rms height of a rough solid [m]; larger ones are in reduced units. A choice."""
 SCALE_RANGE = 1e-100, 1e100
 """Allowed lengths [m] and stresses [Pa]: sums of squares over a spectrum are normal numbers."""
+LENGTH_RANGE = 1e-30, 1e30
+"""Allowed sides of a cell [m]: fourth powers of wavenumbers are normal numbers. A choice."""
 DURATIONS = (("d", 86400), ("h", 3600), ("min", 60), ("s", 1))
 
 

@@ -449,12 +449,23 @@ def test_what_is_no_spec_is_refused():
         solve(None)
 
 
-def test_overrides_are_several_strings(tmp_path):
+@pytest.mark.parametrize(
+    "overrides", ["grid.points=48", 48, ["grid.points=48", 1], {"grid.points": 48}]
+)
+def test_overrides_are_several_strings(tmp_path, overrides):
     """A string is a sequence of strings, too: its letters."""
     path = tmp_path / "spec.toml"
     path.write_text("")
-    with pytest.raises(InputError, match=r"overrides = 'grid.points=48': a tuple or list"):
-        run(path, overrides="grid.points=48")
+    with pytest.raises(InputError, match=r"overrides = .*48.*: a tuple or list of strings"):
+        run(path, overrides=overrides)
+
+
+@pytest.mark.parametrize("second", ["pressure=1e5", "p_star=0.2"])
+def test_two_loads_among_the_overrides_are_refused(tmp_path, second):
+    path = tmp_path / "spec.toml"
+    path.write_text("")
+    with pytest.raises(InputError, match=r"takes the place of --set load\.p_star=0\.1"):
+        run(path, overrides=("load.p_star=0.1", f"load.{second}"))
 
 
 @pytest.mark.parametrize("threads", [0, 1.5, True, "2", None])

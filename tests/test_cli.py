@@ -286,6 +286,13 @@ def test_a_surface_without_any_wave_is_refused_with_its_key(gfmd, points):
     assert not Path("small.h5").exists()
 
 
+@pytest.mark.parametrize("cutoff", [1e-6, 1e-30])
+def test_a_cut_off_that_no_grid_resolves_has_no_summary(gfmd, cutoff):
+    result = gfmd("surface", "spec.toml", "--set", f"surface.cutoff={cutoff}")
+    assert result.exit_code == 2
+    assert f"do not resolve the surface (kind 'self-affine', cutoff = {cutoff:g}" in result.output
+
+
 def test_a_roll_off_beyond_all_waves_is_refused_with_its_key(gfmd):
     result = gfmd("run", "spec.toml", "--set", "surface.rolloff=1e200")
     assert result.exit_code == 2

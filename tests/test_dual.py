@@ -11,7 +11,7 @@ from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.solvers import dual
 from gfmd_cli.solvers.contact_state import FREE, PENETRATING, PRESSED
 from gfmd_cli.solvers.dual import Dual
-from gfmd_cli.solvers.loop import ROUNDING_MARGIN
+from gfmd_cli.solvers.loop import ROUNDING_MARGIN, solve
 from gfmd_cli.solvers.nested_grids import solve_contact
 from gfmd_cli.solvers.stress_preconditioner import StressPreconditioner
 
@@ -76,6 +76,24 @@ def test_moves_of_any_size_keep_the_load(p_star):
     stress = solve_contact(contact, Dual(nested=False)).sigma
     assert stress.min() >= 0
     assert stress.mean() == pytest.approx(p_star, rel=1e-12)
+
+
+@pytest.mark.parametrize("elastomer", ELASTOMERS, ids=lambda elastomer: elastomer.label)
+def test_moves_that_become_longer_keep_the_load(elastomer):
+    """After a short move each is up to a hundred times as long; the error of the load is not."""
+    contact = oblong_contact(elastomer)
+    solver = Dual(tolerance=1e-2)
+    state = solver.begin(contact, contact.grid.empty())
+    state.length = 1e-10
+    lengths, sums = [], []
+
+    def watch(_, state):
+        lengths.append(state.length)
+        sums.append(state.sigma.sum())
+
+    assert solve(contact, solver, state, watch) == "converged"
+    assert max(np.divide(lengths[1:], lengths[:-1])) > 10
+    assert np.array([*sums, state.sigma.sum()]) == pytest.approx(TOTAL, rel=1e-12, abs=0)
 
 
 @pytest.mark.parametrize("beta", [0.0, 0.3, 50.0])

@@ -426,6 +426,16 @@ def test_a_wrong_header_of_an_esri_grid_is_refused(saved, old, new, reason):
         read_topography(saved(GRID.replace(old, new) + matrix(" ")))
 
 
+@pytest.mark.parametrize("word", ["1_2", "x"])
+@pytest.mark.parametrize(("old", "line"), [(" 0.5\n", 5), (" {}\n", 7)])
+def test_a_word_in_an_esri_grid_that_is_no_number_is_named(saved, old, line, word):
+    text = GRID + matrix(" ")
+    second = text.splitlines(keepends=True)[6]
+    old = old.format(second.split()[-1])
+    with pytest.raises(InputError, match=rf":{line}: '{word}' is not a number"):
+        read_topography(saved(text.replace(old, f" {word}\n", 1)))
+
+
 @pytest.mark.parametrize("parts", [(50, 250), (100,) * 3, (299, 1)])
 def test_a_row_of_an_esri_grid_may_have_several_lines(saved, parts):
     rows = (np.split(row, np.cumsum(parts)[:-1]) for row in HEIGHTS)

@@ -48,6 +48,24 @@ def test_points_have_the_values_that_are_drawn_with_their_errors(figure):
     assert "error_y" not in other
 
 
+def test_bars_of_two_lengths_go_down_and_up():
+    plot = ColumnFigure(P_STAR, LABELS["u_g"])
+    plot.points(STYLE, X, Y, error=np.array([[0.1, 0.25, 0.3], [0.1, 0.5, 0.2]]))
+    (points,) = interactive(plot)["data"]
+    bars = points["error_y"]
+    assert (bars["arrayminus"], bars["array"]) == ([0.1, 0.25, 0.3], [0.1, 0.5, 0.2])
+    assert bars["symmetric"] is False
+    assert points["text"][1].endswith(": 2.00 ± 0.50")  # the longer one
+
+
+def test_the_second_axis_has_the_range_of_the_first_one_times_its_factor(figure):
+    figure.second_x("p (MPa)", 5.0)
+    data = interactive(figure)
+    ends = np.log10(5 * np.array(figure.axes.get_xlim()))
+    assert data["layout"]["xaxis2"]["range"] == pytest.approx(list(ends))
+    assert (data["layout"]["xaxis2"]["type"], data["factor"]) == ("log", 5.0)
+
+
 def test_a_point_says_its_curve_values_and_details_as_escaped_text(figure):
     first, second = interactive(figure)["data"][0]["text"]
     assert first.split("<br>") == [

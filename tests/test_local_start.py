@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import scipy.signal
 from fields import assert_close
-from projections import new_direction, projected
+from projections import feasible, new_direction, projected
 
 from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.physics.contact import Contact
@@ -66,27 +66,39 @@ def test_a_convolution_on_tiles_is_that_of_the_grid(boundary):
     assert convolved == pytest.approx(tiles.take(expected), abs=2e-4)
 
 
-def test_the_compiled_move_on_tiles_is_that_of_the_formulas():
-    """On the points that are active, and zero elsewhere."""
+@pytest.mark.parametrize(
+    ("sign", "old_slope", "is_kept"),
+    [(1, 2.0, None), (-1, 2.0, True), (-1, 0.01, False), (-1, 0.0, None)],
+)
+def test_the_compiled_move_on_tiles_is_that_of_the_formulas(sign, old_slope, is_kept):
+    """On the points that are active, and zero elsewhere.
+
+    beta is zero, or the last direction is kept, or it would raise the energy.
+    """
     random = np.random.default_rng(3)
     s = np.maximum(random.standard_normal((9, 64)), 0.0)
     gap, z = random.standard_normal((2, *s.shape))
     last_force, last = random.standard_normal((2, *s.shape))
     active, (force, direction, move) = np.zeros(s.shape, dtype=bool), np.empty((3, *s.shape))
     chosen = (s > 0) | (gap < gap[s > 0].mean())
-    last_force[~chosen] = last[~chosen] = 0.0
+    last[~chosen] = 0.0
+    last_force = sign * (last_force + 1)  # the points of the last step were others
     expected = -(gap[chosen] - gap[chosen].mean())
     squares = np.square(np.minimum(gap - gap[s > 0].mean(), s)[chosen]).sum()
     assert local_kernels.balance(s, gap, active, force) == pytest.approx(squares)
     assert np.array_equal(active, chosen)
     assert force[chosen] == pytest.approx(expected)
+    if is_kept is False:
+        last = -force
     z = z.astype(np.float32)
     balanced = z[chosen] - z[chosen].mean()
     fields = (active, force, last_force, last, direction, move)
-    slope, is_clipped = local_kernels.find_move(z, s, *fields, 2.0, 0.7, s.sum())
+    slope, is_clipped = local_kernels.find_move(z, s, *fields, old_slope, 0.7, s.sum())
     assert slope == pytest.approx(balanced @ force[chosen], rel=1e-4)
-    beta = polak_ribiere(slope - balanced @ last_force[chosen], 2.0)
+    beta = polak_ribiere(slope - balanced @ last_force[chosen], old_slope)
     expected = new_direction(balanced, beta * last[chosen], s[chosen], force[chosen])
+    assert (beta > 0) == (is_kept is not None)
+    assert np.allclose(expected, feasible(balanced, s[chosen]), atol=1e-4) == (not is_kept)
     assert direction[chosen] == pytest.approx(expected, abs=1e-4)
     target = s[chosen] + 0.7 * direction[chosen]
     assert move[chosen] == pytest.approx(projected(target, s.sum()) - s[chosen])

@@ -423,9 +423,8 @@ def test_a_pressure_that_is_nothing_in_reduced_units_is_refused():
         (SelfAffine(cutoff=0.05, h_std=1e160), Power(n=1)),
         (SelfAffine(cutoff=0.05, h_std=1.7e308), Power(n=1)),
         (SelfAffine(cutoff=0.05, rolloff=1e300), Power(n=1)),
-        (SelfAffine(cutoff=0.05, length=1e-40), Power(n=4)),
-        (SelfAffine(cutoff=0.05, length=1e77), Power(n=4)),
-        (SelfAffine(cutoff=0.05, length=1e300), Power(n=0)),
+        (SelfAffine(cutoff=0.05, length=1e-30), Power(n=4)),
+        (SelfAffine(cutoff=0.05, length=1e30), Power(n=4)),
         (SelfAffine(cutoff=0.05), Power(n=1, k_n=1e160)),
         (SelfAffine(cutoff=0.05), Power(n=1, k_n=1e-310)),
         (SelfAffine(cutoff=0.05), Plate(thickness=1e110)),
@@ -433,7 +432,7 @@ def test_a_pressure_that_is_nothing_in_reduced_units_is_refused():
         (Parabola(radius=1e-300, length=1e12), Power(n=1)),
         (PowerLawIndenter(exponent=100, radius=1e-12), Power(n=1)),
         (Punch(depth=1e300), Power(n=1)),
-        (Ridge(slope=1e300, length=1e100), Power(n=1)),
+        (Ridge(slope=1e300, length=1e30), Power(n=1)),
     ],
 )
 def test_scales_out_of_range_are_refused(surface, elastomer):

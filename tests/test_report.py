@@ -26,9 +26,10 @@ from gfmd_cli.physics.persson import Shells
 from gfmd_cli.physics.surface_spectrum import spectrum
 from gfmd_cli.report import maps, rendering
 from gfmd_cli.report.data import read_report_data
-from gfmd_cli.report.maps import STRESS_SCALE, read_profile
+from gfmd_cli.report.maps import STRESS_SCALE, profile_figure, read_profile
 from gfmd_cli.report.page import report
 from gfmd_cli.report.rendering import environment, typeset
+from gfmd_cli.report.sections import stress_distribution
 from gfmd_cli.report.summary import headline, key_numbers, warnings
 from gfmd_cli.report.surface import surface_spectrum
 from gfmd_cli.report.theme import DARK, LEGIBLE, LIGHT, PALETTE, contrast, toned
@@ -470,22 +471,26 @@ def test_the_cross_section_passes_through_the_row_with_most_load(study):
     assert profile.position[1] == pytest.approx(row["length"] / loads.size)
 
 
-def test_at_a_free_border_the_cross_section_avoids_rows_near_it(invoke, tmp_path):
+@pytest.mark.parametrize("is_turned", [False, True])
+def test_at_a_free_border_the_cross_section_avoids_rows_near_it(invoke, tmp_path, is_turned):
     """A summit at the border carries most load; at the lower load it alone touches."""
     y, x = np.mgrid[:32, :32] / 32
     at_border, inside = (np.hypot(x - 0.5, y - summit) for summit in (0.0, 0.6))
     heights = np.maximum(0.6 - 8 * at_border, 0.3 - inside)
-    np.save(tmp_path / "scan.npy", 1e-6 * np.maximum(heights, 0.0))
+    heights = 1e-6 * np.maximum(heights, 0.0)
+    np.save(tmp_path / "scan.npy", heights[::-1] if is_turned else heights)
     text = ONE.replace('"self-affine"\ncutoff = 0.1', '"file"\npath = "scan.npy"\nlevel = "none"')
     text = text.replace("[elastomer]", "length = 1e-4\nperiodic = false\n[elastomer]")
     study = solved(invoke, tmp_path, text.replace("p_star = 0.3", "p_star = [1e-3, 1.0]"))
     with open_study(study) as file:
         alone, both = (read_profile(file, row) for row in read_rows(study))
         loads = np.maximum(file.arrays("fields", 1)["sigma"], 0.0).sum(axis=1)
-    assert loads.argmax() == 0
-    assert loads[19] > 0
-    assert f"away from the borders that carries most load (y = 59.4{SPACE}µm)" in both.place
-    assert f"the row that carries most load (y = 0{SPACE}m)" in alone.place
+    border, inner = loads.argmax(), 6 + loads[6:-6].argmax()  # of 64 rows, twice those of the map
+    assert border == (63 if is_turned else 0)
+    assert inner // 2 == (12 if is_turned else 19)
+    most = "that carries most load (y = "
+    assert f"away from the borders {most}{with_unit(inner / 64 * 1e-4, 'm')})" in both.place
+    assert f"the row {most}{with_unit(border / 64 * 1e-4, 'm')})" in alone.place
 
 
 def test_alternative_texts_name_curves_and_contacts(whole):
@@ -499,7 +504,11 @@ def test_alternative_texts_name_curves_and_contacts(whole):
 
 
 def test_a_line_scene_shows_its_fields_as_a_cross_section(invoke, tmp_path):
-    page = Page(report(solved(invoke, tmp_path, LINE)))
+    path = solved(invoke, tmp_path, LINE)
+    with open_study(path) as stored:
+        profile = read_profile(stored, *read_rows(path))
+    assert profile.position == pytest.approx(np.arange(-32, 32) / 64)  # from the crest
+    page = Page(report(path))
     labels = [drawing["aria-label"] for drawing in page.all("svg")]
     assert any(label.startswith("Cross-section along the cell") for label in labels)
     assert not any(label.startswith("Map of") for label in labels)
@@ -634,6 +643,154 @@ def test_maps_and_cross_sections_of_an_indenter_count_from_its_crest(invoke, tmp
         (image,) = figure.axes.images
         assert image.get_extent() == pytest.approx([-50, 50, -50, 50])  # micrometres
     assert profile.position[0] == pytest.approx(-50e-6)
+    with h5py.File(path, "r+") as file:
+        del file["fields/0"]
+    with open_study(path) as stored:
+        profile = read_profile(stored, row)
+    assert profile.along == "the diagonal"
+    assert profile.position[0] == pytest.approx(-50e-6 * np.sqrt(2))
+
+
+@pytest.fixture(scope="module")
+def oblong(invoke, tmp_path_factory):
+    """A study in SI units of one contact on a cell of 100 um x 50 um with oblong pixels."""
+    text = ONE.replace('kind = "power"\nn = 1', 'kind = "half-space"\nE_star = 2e9')
+    sides = "length = 1e-4\nlength_y = 5e-5\nh_std = 1e-7"
+    text = text.replace("cutoff = 0.1", f"cutoff = 0.1\n{sides}")
+    text = text.replace("points = 64", "points = 64\npoints_y = 48")
+    return solved(invoke, tmp_path_factory.mktemp("oblong"), text)
+
+
+def in_si(label, values):
+    """Values of an axis in the SI unit of its label, such as "gap (nm)"."""
+    prefix = re.fullmatch(r".* \((.?)(m|Pa)\)", label)[1]
+    unit = {"n": 1e-9, "µ": 1e-6, "": 1.0, "k": 1e3, "M": 1e6, "G": 1e9}[prefix]
+    return unit * np.asarray(values)
+
+
+def test_maps_show_the_fields_in_the_units_of_their_axes(oblong):
+    (row,) = read_rows(oblong)
+    with open_study(oblong) as stored:
+        fields = stored.arrays("fields", 0)
+        figures, captions = {}, {}
+        for name, figure, captions[name] in maps._map_figures(stored, row):
+            figures[name] = figure
+    sigma, gap = fields["sigma"], fields["u"] - fields["height"]
+    touching = (gap == 0) & (sigma > 0)
+    for figure in figures.values():
+        (image,) = figure.axes.images
+        left, right, bottom, top = image.get_extent()
+        assert image.origin == "lower"
+        assert in_si(figure.axes.get_xlabel(), [left, right]) == pytest.approx([0, 1e-4])
+        assert in_si(figure.axes.get_ylabel(), [bottom, top]) == pytest.approx([0, 5e-5])
+    (image,) = figures["contact"].axes.images
+    assert np.array_equal(np.asarray(image.get_array())[..., 3], touching)
+    for name, field, shown in (("stress", sigma, touching), ("gap", gap, ~touching)):
+        (image,) = figures[name].axes.images
+        drawn = image.get_array()
+        label = image.colorbar.ax.get_ylabel()
+        assert np.array_equal(~np.ma.getmaskarray(drawn), shown)
+        assert in_si(label, drawn[shown]) == pytest.approx(field[shown], rel=1e-6)
+        assert image.norm.vmin == 0
+        above = field[shown] > in_si(label, image.norm.vmax)
+        assert above.mean() == pytest.approx(0.01, abs=2 / shown.sum())
+        assert ", red: the 1 % of the " in captions[name]
+
+
+def test_a_map_of_the_stress_alone_shows_the_contact(oblong, tmp_path):
+    """Stress far below the pressure is rounding; contact of so little stress is rare."""
+    path = Path(shutil.copy(oblong, tmp_path / "copy.h5"))
+    with h5py.File(path, "r+") as file:
+        height, u = (file["fields/0"].pop(name)[...] for name in ("height", "u"))
+    (row,) = read_rows(path)
+    with open_study(path) as stored:
+        sigma = stored.arrays("fields", 0)["sigma"]
+        ((name, figure, _),) = maps._map_figures(stored, row)
+    assert name == "stress"
+    (image,) = figure.axes.images
+    touching = (u == height) & (sigma > 0)
+    assert np.mean(np.ma.getmaskarray(image.get_array()) == touching) < 0.01
+
+
+def test_a_grid_of_many_rows_is_drawn_in_fewer_pixels(invoke, oblong, tmp_path):
+    text = ONE.replace("n = 1", "n = 0").replace("points = 64", "points = 32\npoints_y = 300")
+    path = solved(invoke, tmp_path, text)
+    (row,) = read_rows(path)
+    with open_study(path) as stored:
+        stress = stored.arrays("fields", 0)["sigma"]
+        figures = [figure for _, figure, _ in maps._map_figures(stored, row)]
+        profile = read_profile(stored, row)
+    for figure in figures:
+        assert figure.axes.images[0].get_array().shape[:2] == (150, 16)
+    loads = stress.sum(axis=1)
+    assert np.argmax(loads) < 256  # of the first rows that are read
+    assert np.array_equal(profile.values["sigma"], stress[np.argmax(loads)])
+    note = "Maps have up to 256 pixels a side, each the mean of some grid points."
+    for study, has_note in ((path, True), (oblong, False)):
+        assert (note in maps.maps(read_report_data(study, "")).notes) == has_note
+
+
+@pytest.mark.parametrize("is_row", [True, False])
+def test_a_cross_section_shows_its_fields_in_the_units_of_its_axes(oblong, tmp_path, is_row):
+    """Along the row that carries most load, or the diagonal where no fields are stored."""
+    path = Path(shutil.copy(oblong, tmp_path / "copy.h5"))
+    if not is_row:
+        with h5py.File(path, "r+") as file:
+            del file["fields/0"]
+    (row,) = read_rows(path)
+    with open_study(path) as stored:
+        profile = read_profile(stored, row)
+    upper, lower = profile_figure(profile).figure.axes
+    indenter, elastomer = upper.lines
+    (stress,) = lower.lines
+    side = 1e-4 if is_row else np.hypot(1e-4, 5e-5)
+    size = stress.get_xdata().size
+    position = in_si(lower.get_xlabel(), stress.get_xdata())
+    assert position == pytest.approx(side * np.arange(size) / size, abs=1e-12)
+    for line, name in ((indenter, "height"), (elastomer, "u")):
+        assert in_si(upper.get_ylabel(), line.get_ydata()) == pytest.approx(profile.values[name])
+    assert in_si(lower.get_ylabel(), stress.get_ydata()) == pytest.approx(profile.values["sigma"])
+    bottom, top = in_si(lower.get_ylabel(), lower.get_ylim())
+    assert bottom < 0 < profile.values["sigma"].max() < top
+    if is_row:
+        with open_study(path) as stored:
+            loads = stored.arrays("fields", 0)["sigma"].sum(axis=1)
+        assert profile.place.endswith(f"(y = {with_unit(5e-5 * loads.argmax() / 48, 'm')})")
+
+
+def test_key_numbers_and_headline_of_a_study_in_si_units(oblong):
+    (row,) = read_rows(oblong)
+    data = read_report_data(oblong, "")
+    numbers = {name: (value, note) for name, value, note in key_numbers(data)}
+    (curve,) = compare(oblong).curves
+    u_g, theory = row["u_g"], curve.prediction.u_g[0]
+    scales = f"rms height h_std, side {with_unit(1e-4, 'm')}"
+    assert numbers["Pressure"] == (with_unit(row["pressure"], "Pa"), "p* = 0.3")
+    assert numbers["Unit of stress"][0] == with_unit(row["pressure"] / 0.3, "Pa")
+    assert numbers["Roughness"] == (with_unit(1e-7, "m"), scales)
+    assert numbers["Mean gap"] == (with_unit(u_g * 1e-7, "m"), f"u_g / h_std = {span([u_g])}")
+    assert numbers["Gap / Persson theory"] == (span([u_g / theory]), "u_g up to p* = 0.5")
+    assert numbers["Time"][0] == with_unit(row["seconds"], "s")
+    assert f"1 pressure, p* = 0.3 ({with_unit(row['pressure'], 'Pa')}), 64 x 48 points." in (
+        headline(data)
+    )
+
+
+def test_the_bins_of_the_stress_are_the_same_in_si_units(oblong):
+    """sigma Pr(sigma) has no unit, and sigma is a share of the rms stress in full contact."""
+    (row,) = read_rows(oblong)
+    (table,) = (
+        each
+        for title, each in stress_distribution(read_report_data(oblong, "")).disclosed.items()
+        if "elastomers" in title
+    )
+    records = table.groups[0].records
+    reduced, sigma, reduced_density, density = (
+        np.array([float(column.cell(record)) for record in records]) for column in table.columns[:4]
+    )
+    assert [column.unit for column in table.columns[:4]] == ["", "Pa", "", "1/Pa"]
+    assert sigma == pytest.approx(reduced * row["pressure"] / 0.3, rel=2e-3)  # of four digits
+    assert sigma * density == pytest.approx(reduced * reduced_density, rel=3e-3)
 
 
 @pytest.mark.parametrize("step", [1, 2, 3])

@@ -210,6 +210,12 @@ def test_a_study_in_the_queue_is_not_submitted_twice(gfmd, calls, tmp_path):
         (("--shards", "5"), "--shards 5: must be from 1 to 4, the number of tasks"),
         (("--shards", "0"), "must be from 1 to 4"),
         (("--shards", "2", "--time", "soon"), "such as 12:00:00"),
+        (("--shards", "2", "--time", ""), "--time '': is empty"),
+        (("--shards", "2", "--partition", " "), "--partition ' ': is empty"),
+        (("--missing", "--account", ""), "--account '': is empty"),
+        (("--shards", "2", "--mem", "x"), "--mem x: write a whole number of megabytes"),
+        (("--shards", "2", "--mem", "1.5G"), "such as 8G"),
+        (("--missing", "--mem", "-1"), "such as 8G"),
         (("--shards", "2", "--account", "a\n#SBATCH --uid=0"), "printable"),
         (("--shards", "2", "--sbatch", "array=0-99"), "gfmd submit sets --"),
         (("--shards", "2", "--sbatch", "; rm"), "such as --sbatch qos=long"),
@@ -224,6 +230,12 @@ def test_bad_usage_is_refused_in_one_message_and_writes_nothing(gfmd, calls, wor
     assert message in result.output
     assert set(Path().iterdir()) == before
     assert calls() == []
+
+
+@pytest.mark.parametrize("size", ["0", "500", "4096K", "100M", "8g", "8GB", "1T"])
+def test_memory_is_given_as_sbatch_takes_it(gfmd, size):
+    result = gfmd("submit", "spec.toml", "--shards", 2, "--mem", size, "--dry-run")
+    assert f"#SBATCH --mem={size}\n" in result.output
 
 
 def test_another_call_does_not_run_the_old_script(gfmd):

@@ -11,7 +11,7 @@ from gfmd_cli.files.file_cache import forget_files
 from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.physics.elastomers import HalfSpace
 from gfmd_cli.physics.file_surface import FileSurface
-from gfmd_cli.physics.persson import shells
+from gfmd_cli.physics.persson import Persson, shells
 from gfmd_cli.physics.scenes import build_scene
 from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.physics.spectrum_fit import fit, moments
@@ -184,6 +184,16 @@ def test_the_random_surface_of_a_mirrored_map_has_the_density_of_the_fit(seed, r
     of_fit = fitted.density(waves.q[middle]) * (side / 2) ** 2
     assert density == pytest.approx(of_fit, rel=0.01)
     assert moments(waves).gradient == pytest.approx(summary.moments.gradient, rel=0.1)
+
+
+def test_the_gaps_of_the_fit_are_those_of_the_random_surface(tmp_path):
+    summary = fit_of_map(part_of_roughness(0, 0.5), tmp_path)
+    surface = suggested(summary)
+    assert surface.h_std != pytest.approx(summary.spectrum.fit.rms_height, rel=0.05)
+    theory = Persson(shells_of(surface, 2 * surface.smallest_grid()))
+    rows = summary_text(summary).partition("gap, fit")[2].splitlines()[1:4]
+    p, gaps = np.array([[float(row.split()[i]) for i in (0, -1)] for row in rows]).T
+    assert gaps == pytest.approx(theory.mean_gap(p), rel=0.01)
 
 
 def test_the_random_surface_of_equal_tiles_has_the_density_of_one(tmp_path):

@@ -9,7 +9,7 @@ import pytest
 
 from gfmd_cli.errors import InputError
 from gfmd_cli.maps import text_tables
-from gfmd_cli.maps.text_tables import shorter_or_longer_row, table_formats
+from gfmd_cli.maps.text_tables import columns, shorter_or_longer_row
 from gfmd_cli.maps.topography import read_topography
 from gfmd_cli.physics.file_surface import FileSurface
 
@@ -20,6 +20,11 @@ def text(values, separator=" ", header=b"", end=b"\n"):
     """A table in a file."""
     lines = (separator.join(f"{value:.6g}" for value in row).encode() for row in values)
     return header + b"".join(line + end for line in lines)
+
+
+def formats_of(file):
+    """The formats of tables that a file can have."""
+    return text_tables.table_formats(file, columns(file))
 
 
 def on_grid(n, m):
@@ -50,7 +55,7 @@ MAPS = {
 def test_tables_of_heights_are_recognised(monkeypatch, case, window):
     monkeypatch.setattr(text_tables, "WINDOW_BYTES", window)
     content, formats = MAPS[case]
-    assert table_formats(BytesIO(content)) == formats
+    assert formats_of(BytesIO(content)) == formats
 
 
 def ragged(at):
@@ -79,7 +84,7 @@ OTHERS = {
 @pytest.mark.parametrize("window", [2**14, 2**21])
 def test_other_texts_are_no_tables(monkeypatch, case, window):
     monkeypatch.setattr(text_tables, "WINDOW_BYTES", window)
-    assert table_formats(BytesIO(OTHERS[case])) == set()
+    assert formats_of(BytesIO(OTHERS[case])) == set()
 
 
 def test_positions_may_stand_after_the_heights(tmp_path, monkeypatch):
@@ -322,7 +327,7 @@ def test_a_long_table_that_is_no_map_takes_no_longer_than_a_short_one(tmp_path, 
                     file.write(block * (2**24 // len(block)))
         begun = time.process_time()
         with (tmp_path / "table").open("rb") as file:
-            assert table_formats(file) == set()
+            assert formats_of(file) == set()
         seconds.append(time.process_time() - begun)
     assert max(seconds) < 5
     assert seconds[1] < 3 * seconds[0] + 0.5
@@ -365,3 +370,27 @@ def test_a_fourth_column_beside_positions_is_refused(tmp_path):
     np.savetxt(path, np.column_stack([x.ravel(), y.ravel(), *values]))
     with pytest.raises(InputError, match="one of 4 columns is sorted"):
         FileSurface(path=path).smallest_grid()
+
+
+@pytest.mark.parametrize("separator", [" ", ",", ";"])
+@pytest.mark.parametrize(("columns_read", "place"), [(40, 7), (3, 1), (3, 2), (2, 1)])
+def test_underscores_in_numbers_are_refused(tmp_path, columns_read, place, separator):
+    """Python alone takes 1_2 as 12."""
+    table = {2: POINTS[:50, ::2], 3: POINTS, 40: MATRIX}[columns_read]
+    lines = text(table, separator).split(b"\n")
+    words = lines[10].split(separator.encode())
+    words[place] = b"1_2"
+    lines[10] = separator.encode().join(words)
+    (tmp_path / "h.txt").write_bytes(b"\n".join(lines))
+    with pytest.raises(InputError, match=r"h\.txt:11: '.*1_2.* write NaN for a missing height"):
+        read_topography(tmp_path / "h.txt")
+
+
+def test_lines_are_counted_as_python_splits_them():
+    """Also with characters that end no line, and line ends of all kinds."""
+    some = list(b'1 2.\t\n\r\n\x0b\x0ca,;"\x01\xc2')
+    for size in range(1, 500):
+        content = bytes(RNG.choice(some, size).tolist())
+        lines = content.splitlines()
+        expected = [len(line.split()) if text_tables.is_numeric(line) else 0 for line in lines]
+        assert text_tables._counts(content).tolist() == expected

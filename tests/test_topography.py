@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from scipy.io import netcdf_file, savemat
 
+from gfmd_cli import solve
 from gfmd_cli.errors import InputError
 from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.maps import height_map, microscope_files
@@ -848,6 +849,18 @@ def test_an_array_of_one_dimension_is_a_line_profile(npy):
     surface = FileSurface(path=npy(line), length=2e-6)
     assert (surface.dimension, surface.smallest_grid(), surface.sides) == (1, 20, (2e-6,))
     np.testing.assert_array_equal(surface.heights(20), line)
+
+
+@pytest.mark.parametrize("length_y", [1e-30, 1e30])
+@pytest.mark.parametrize("boundary", ["periodic", "free"])
+def test_a_map_of_too_different_sides_is_refused(npy, boundary, length_y):
+    heights = np.random.default_rng(0).normal(size=(16, 16))
+    surface = {"kind": "file", "path": str(npy(heights)), "length_y": length_y}
+    tables = {"surface": surface, "elastomer": {"kind": "half-space"}, "load": {"p_star": 0.1}}
+    with pytest.raises(
+        InputError, match=r"length_y = 1e.* m is out of range: the side along x has"
+    ):
+        solve(tables | {"grid": {"points": 16, "boundary": boundary}})
 
 
 def test_a_line_profile_has_no_side_along_y(npy):

@@ -193,8 +193,8 @@ class StressDistribution:
         slope = np.gradient(
             np.log(np.maximum(points, 1.0)), np.log(geometric_middles(LOGARITHMIC_EDGES))
         )
-        patches = sum(_patches(rows[-1]) for rows in self.seeds)
-        patches = patches * np.exp(-((slope * PATCH_SCATTER) ** 2))
+        weight = np.exp(-((slope * PATCH_SCATTER) ** 2))
+        patches = weight * sum(_patches(rows[-1]) for rows in self.seeds)
         expected = 1 / np.maximum(np.minimum(patches, points), 1.0)
         if count == 1:
             return np.sqrt(expected)

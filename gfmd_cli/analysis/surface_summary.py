@@ -14,8 +14,8 @@ from gfmd_cli.maps.map_warnings import unresolved
 from gfmd_cli.maps.roughness_parameters import MAP_NAMES, PROFILE_NAMES, roughness_parameters
 from gfmd_cli.physics.contact import Scene
 from gfmd_cli.physics.elastomers import HalfSpace
-from gfmd_cli.physics.indenters import RigidSurface
-from gfmd_cli.physics.persson import Persson
+from gfmd_cli.physics.indenters import MAX_POINTS, RigidSurface
+from gfmd_cli.physics.persson import Persson, Shells
 from gfmd_cli.physics.scenes import build_scene
 from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.physics.spectrum_fit import Moments, SelfAffineFit, moments
@@ -93,6 +93,7 @@ def summarise(surface: RigidSurface, points: int = 0) -> SurfaceSummary:
     Raises InputError for an unfit surface.
     """
     repeated = surface.within("periodic")
+    repeated.check_resolved(MAX_POINTS, MAX_POINTS)
     smallest = repeated.smallest_grid()
     # modes at the Nyquist wavenumber are counted twice
     points = smallest if surface.is_map else max(points, 2 * smallest)
@@ -159,27 +160,27 @@ def summary_text(summary: SurfaceSummary) -> str:
     ]
     lines += [f"warning: {warning}" for warning in summary.warnings()]
     nearest = summary.spectrum.fit
-    theories = {"spectrum": summary.scene}
+    spectra = {"spectrum": summary.scene.shells}
     random: list[str] = []
     if nearest is not None and not _reason_against(nearest, grid.length):
         copies = summary.surface.within("periodic").copies
         tiles = copies**2 if copies > 1 else summary.scene.texture.tiles
-        table = _table(nearest, grid.length, grid.area / tiles)  # the fit is that of one tile
-        theories["fit"] = _scene(table)
+        # the fit is that of one tile
+        table, spectra["fit"] = _suggestion(nearest, grid.length, grid.area / tiles)
         random = ["random surface with the fitted spectrum:", "", "[surface]"]
         random += [f"{key} = {json.dumps(value)}" for key, value in table.items()]
     if grid.dimension == 2:
         fitted = [f"no fit: {summary.spectrum.no_fit}"]
         if nearest is not None:
             fitted = _fit_lines(nearest, grid.length, metres)
-        lines += [*fitted, *_predicted(theories, metres), *random]
+        lines += [*fitted, *_predicted(spectra, metres), *random]
     title = summary.surface.preparation() or summary.surface.label
     return "\n".join([title, *(f"  {line}".rstrip() for line in lines)])
 
 
-def _predicted(scenes: dict[str, Scene], metres: str) -> list[str]:
+def _predicted(spectra: dict[str, Shells], metres: str) -> list[str]:
     """Persson theory of a half-space, Eqs. (25) and (28), on one spectrum or two."""
-    theories = {name: Persson(scene.shells) for name, scene in scenes.items()}
+    theories = {name: Persson(waves) for name, waves in spectra.items()}
     p = PRESSURES * theories["spectrum"].delta_sigma
     gaps = {name: theory.mean_gap(p) for name, theory in theories.items()}
     records = records_of(p=p, a_r=theories["spectrum"].contact_area(p), **gaps)
@@ -228,12 +229,16 @@ def _fit_lines(nearest: SelfAffineFit, length: float, metres: str) -> list[str]:
     return lines
 
 
-def _table(nearest: SelfAffineFit, length: float, area: float) -> dict[str, Any]:
+def _suggestion(
+    nearest: SelfAffineFit, length: float, area: float
+) -> tuple[dict[str, Any], Shells]:
     """The fit as a table [surface] of a run spec, on a square cell of side `length` [m].
 
     The fit is that of `area` [m^2], for a mirrored map the area of the map, not of the cell. The
     spectral density, |h(q)|^2 times the area, is the same on the cell; the rms height is larger, as
     the cell has longer waves.
+
+    Returns the table, and the spectrum of this surface under a half-space of unit modulus.
     """
     rolloff = nearest.rolloff_wavelength
     numbers = {
@@ -245,12 +250,10 @@ def _table(nearest: SelfAffineFit, length: float, area: float) -> dict[str, Any]
     }
     rounded = {key: float(f"{value:.4g}") for key, value in numbers.items()}
     table = {"kind": "self-affine"} | ({} if rolloff else {"spectrum": "cutoff"}) | rounded
-    waves = _scene(table).shells
-    variance = np.sum(waves.modes * nearest.density(waves.q)) * area / length**2
-    return table | {"h_std": float(f"{np.sqrt(variance):.4g}")}
-
-
-def _scene(table: dict[str, Any]) -> Scene:
-    """The random surface of a table [surface] under a half-space of unit modulus."""
     model = SelfAffine.model_validate(table)
-    return build_scene(model, HalfSpace(), first_grid(model))
+    waves = build_scene(model, HalfSpace(), first_grid(model)).shells
+    variance = np.sum(waves.modes * nearest.density(waves.q)) * area / length**2
+    h_std = float(f"{np.sqrt(variance):.4g}")
+    factor = (h_std / rounded["h_std"]) ** 2
+    scaled = {name: factor * getattr(waves, name) for name in ("height", "energy", "variance")}
+    return table | {"h_std": h_std}, replace(waves, **scaled)

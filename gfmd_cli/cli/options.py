@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from gfmd_cli.errors import InputError, typed
+from gfmd_cli.errors import typed
 
 
 class Number(click.FloatRange):
@@ -42,16 +42,9 @@ def _distinct(
     context: click.Context, parameter: click.Parameter, overrides: tuple[str, ...]
 ) -> tuple[str, ...]:
     """The values of --set. Raises InputError for two values of one key, and for two loads."""
-    from gfmd_cli.spec.models import LOADS
+    from gfmd_cli.spec.parse import check_distinct
 
-    given: dict[str, str] = {}
-    for override in overrides:
-        key = override.partition("=")[0].strip()
-        key = "load" if key.removeprefix("load.") in LOADS else key
-        if (earlier := given.setdefault(key, override)) != override:
-            raise InputError(
-                f"--set {override}: takes the place of --set {earlier}; give one of them"
-            )
+    check_distinct(overrides)
     return overrides
 
 

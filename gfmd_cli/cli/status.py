@@ -36,7 +36,8 @@ def status(
     The output is the number of tasks by status, the tasks that have not converged, the errors that
     ended tasks, and the next command to type. The command reads the study and its folder of
     unfinished work and changes nothing, so it can be called at any time. It does not query the
-    batch system. Example:
+    batch system. With a study as its argument, the tasks are those of the last spec and all solved
+    ones: missing tasks of an earlier spec are shown with that spec as the argument. Example:
 
         gfmd status configs/demo.toml --shards 4
     """

@@ -118,9 +118,12 @@ def _check_target(path: Path) -> None:
     Raises OSError where the folder cannot be searched.
     """
     if not path.parent.is_dir():
+        with suppress(FileNotFoundError, NotADirectoryError):
+            path.parent.stat()  # raises other errors, which `is_dir` ignores from Python 3.14 on
         raise SpaceError(f"{path}: cannot be written: there is no folder {path.parent}")
-    if path.exists() and not path.stat().st_mode & WRITABLE:
-        raise SpaceError(f"{path}: cannot be written: it is read-only (see chmod)")
+    with suppress(FileNotFoundError):
+        if not path.stat().st_mode & WRITABLE:
+            raise SpaceError(f"{path}: cannot be written: it is read-only (see chmod)")
 
 
 def make_folder(path: Path) -> None:

@@ -4,14 +4,16 @@ The map has its rows from south to north, as y increases.
 """
 
 import re
-from itertools import accumulate
+from contextlib import suppress
+from itertools import accumulate, chain
 from pathlib import Path
 
 import numpy as np
 
 from gfmd_cli.errors import InputError
+from gfmd_cli.grid.arrays import Field
 from gfmd_cli.maps.height_map import HeightMap, check_layout, shape_text
-from gfmd_cli.maps.text_tables import in_utf8, with_blanks
+from gfmd_cli.maps.text_tables import in_utf8, is_number, with_blanks
 
 SIGNATURE = re.compile(rb"(\xef\xbb\xbf)?\s*n(cols|rows)\s", re.IGNORECASE)
 NO_DATA = -9999.0  # where the header does not state another value
@@ -25,16 +27,18 @@ def read_esri_grid(path: Path, dataset: str | None) -> HeightMap:
     with path.open("rb") as binary:
         file, warning = with_blanks(in_utf8(binary))
         file.seek(0)
-        for line in file:
-            words = line.decode(errors="replace").lower().replace(",", ".").split()
-            if len(words) != 2 or not words[0].isidentifier():
+        for above, line in enumerate(file):
+            words = line.lower().replace(b",", b".").split()
+            key = words[0].decode(errors="replace") if words else ""
+            if len(words) != 2 or not key.isidentifier():
                 break
-            header[words[0]] = float(words[1])
+            header[key] = float(_numbers(words[1:], above + 1)[0])
         if absent := [key for key in ("ncols", "nrows", "cellsize") if key not in header]:
             raise InputError(f"the header of an ESRI grid has no {' and no '.join(absent)}")
         shape = int(header["nrows"]), int(header["ncols"])
         check_layout(shape, np.dtype(float))
-        lines = list(filter(np.size, (np.array(each.split(), float) for each in (line, *file))))
+        rows = enumerate(chain([line], file), above + 1)
+        lines = list(filter(np.size, (_numbers(row.split(), number) for number, row in rows)))
     _check_rows([len(each) for each in lines], *shape)
     heights = np.concatenate(lines).reshape(shape)[::-1]
     sides = tuple(header["cellsize"] * points for points in shape)
@@ -42,6 +46,15 @@ def read_esri_grid(path: Path, dataset: str | None) -> HeightMap:
     return HeightMap(
         heights=heights, sides=sides, source="ESRI grid", periodic=False, notes=(warning,)
     )
+
+
+def _numbers(words: list[bytes], line: int) -> Field:
+    """The numbers in a line of a file. Raises InputError for another word."""
+    if b"_" not in b"".join(words):
+        with suppress(ValueError):
+            return np.array(list(map(float, words)))
+    word = next(word for word in words if not is_number(word))
+    raise InputError(f":{line}: {word.decode(errors='replace')!r} is not a number")
 
 
 def _check_rows(counts: list[int], rows: int, columns: int) -> None:

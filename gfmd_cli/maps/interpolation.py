@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 from scipy.fft import dctn
 
-from gfmd_cli.grid.arrays import Field, Mask, row_blocks
+from gfmd_cli.grid.arrays import Field, Mask, Modes, row_blocks
 from gfmd_cli.grid.modes import multiplicity
 
 Interpolation = Literal["fourier", "monotone"]
@@ -60,7 +60,7 @@ def _short_waves(heights: Field, pad_mode: PadMode) -> tuple[float, float]:
     """Fractions of the squared slope in the corners and along the borders of the spectrum."""
     rows, columns = heights.shape
     if pad_mode == "symmetric":  # modes of the mirrored map: of the cosine transform, and a phase
-        modes = dctn(heights - heights.mean())
+        modes: Field | Modes = dctn(heights - heights.mean())
         y, x = np.arange(rows)[:, None] / rows, np.arange(columns) / columns
         of_y, of_x = 1 + (y > 0), 1 + (x > 0)  # with the opposite waves
     else:

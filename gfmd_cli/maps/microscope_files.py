@@ -4,6 +4,7 @@ import re
 import struct
 import warnings
 from codecs import BOM_UTF8
+from contextlib import suppress
 from dataclasses import replace
 from io import BytesIO
 from math import inf, log2
@@ -96,18 +97,19 @@ def read_microscope_file(path: Path, dataset: str | None) -> HeightMap:
             if start.startswith(signature):
                 raise InputError(what)
         table, warning = text_tables.with_blanks(text_tables.in_utf8(file))
-        height_map = read_points(table)
+        width = text_tables.columns(table)
+        height_map = read_points(table, width)
         if height_map is None:
-            table = text_tables.without_size(table)
-            with _open_scan(path, table, readers) as reader:
+            table = text_tables.without_size(table, width)
+            with _open_scan(path, table, width, readers) as reader:
                 height_map = _read_channel(path, table, reader, dataset)
         elif dataset is not None:
             raise InputError(f"a table of positions holds one map; leave out dataset {dataset!r}")
     return replace(height_map, notes=(*height_map.notes, warning))
 
 
-def _open_scan(path: Path, file: BinaryIO, readers: list[Any]) -> Any:
-    """Open a file by the first reader that accepts it.
+def _open_scan(path: Path, file: BinaryIO, width: int, readers: list[Any]) -> Any:
+    """Open a file, a table of so many columns or 0, by the first reader that accepts it.
 
     Readers of tables parse any file to its end, which can take minutes, so they get files that look
     like tables, and small files.
@@ -116,7 +118,7 @@ def _open_scan(path: Path, file: BinaryIO, readers: list[Any]) -> Any:
     """
     start, is_small = text_tables.part(file, 0, SIGNATURE_BYTES), path.stat().st_size <= SMALL_FILE
     file = _in_known_form(file, start)
-    tables = text_tables.table_formats(file)
+    tables = text_tables.table_formats(file, width)
     reasons = []
     for reader in readers:
         answer = reader.can_read(start).name
@@ -124,6 +126,8 @@ def _open_scan(path: Path, file: BinaryIO, readers: list[Any]) -> Any:
         is_read_here = reader.format() == "xyz" and not start.startswith(text_tables.OWN_HEADERS)
         if answer == "NO" or is_read_here or (is_guess and not is_small):
             continue
+        if reader.format() == "asc":
+            reader = _with_fast_rows(reader)
         file.seek(0)
         try:
             return reader(file)
@@ -145,7 +149,7 @@ def _open_scan(path: Path, file: BinaryIO, readers: list[Any]) -> Any:
         )
     if is_compressed:
         what = "a compressed file: unpack it"
-    elif text_tables.columns(file) == 3:
+    elif width == 3:
         what = NO_GRID
     else:
         row = text_tables.shorter_or_longer_row(file) if b"\0" not in start else ""
@@ -153,6 +157,19 @@ def _open_scan(path: Path, file: BinaryIO, readers: list[Any]) -> Any:
     raise InputError(
         f"{what}; .npy, HDF5 and the formats of SurfaceTopography can be read. {REMEDY}"
     )
+
+
+def _with_fast_rows(reader: Any) -> Any:
+    """The reader of matrices, with a faster function for rows of numbers."""
+
+    def parse_data(self: Any, line: str) -> list[float]:
+        if "inf" not in line.lower():  # a mark for this reader, a number for Python
+            with suppress(ValueError):
+                return list(map(float, line.split()))
+        row: list[float] = reader.parse_data(self, line)
+        return row
+
+    return type("FastReader", (reader,), {"parse_data": parse_data})
 
 
 def _in_known_form(file: BinaryIO, start: bytes) -> BinaryIO:
@@ -435,7 +452,8 @@ def _check_all_rows_read(file: BinaryIO, columns: int, rows: int) -> None:
         raise InputError(
             f":{empty[0] + 1}: an empty line in the table: several maps? Save each in its own file"
         )
-    is_one_map = np.count_nonzero(lengths == columns) <= rows
+    is_row = lengths == columns
+    is_one_map, all_read = np.count_nonzero(is_row) <= rows, np.count_nonzero(is_row) == rows
     rows_above = 0
     file.seek(0)
     for number, line in enumerate(file, 1):
@@ -443,6 +461,9 @@ def _check_all_rows_read(file: BinaryIO, columns: int, rows: int) -> None:
             raise InputError(
                 f":{number}: zero bytes in the table: the file is damaged, or not text"
             )
+        if all_read and is_row[number - 1] and b"_" not in line:
+            rows_above += 1
+            continue
         words = line.split()
         marks = [word for word in words if not is_height(word)]
         if not marks:

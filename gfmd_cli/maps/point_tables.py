@@ -19,7 +19,6 @@ from gfmd_cli.maps.height_map import (
 )
 from gfmd_cli.maps.text_tables import (
     OWN_HEADERS,
-    columns,
     is_height,
     is_number,
     is_unit,
@@ -42,16 +41,15 @@ WORDS = re.compile(r"[\[(]([^\])]*)[\])]|([^\W_]+)")
 UNITS_OF_GWYDDION = re.compile(r"(Lateral|Value) units:\s*(\S+)")
 
 
-def read_points(file: BinaryIO) -> HeightMap | None:
-    """Read a table of positions and heights; None for any other file.
+def read_points(file: BinaryIO, count: int) -> HeightMap | None:
+    """Read a table of positions and heights of so many columns; None for any other file.
 
     The columns are x, y and height, or x and height, unless the header names another order. Raises
     InputError for points that are not those of a grid, and for units that are not clear.
     """
-    content = part(file) if "xyz" in table_formats(file) else b""
+    content = part(file) if "xyz" in table_formats(file, count) else b""
     if not content or content.startswith(OWN_HEADERS):
         return None
-    count = columns(file)
     lines = content.replace(b",", b" ").replace(b";", b" ").splitlines()
     first = next((i for i, line in enumerate(lines) if _is_row(line.split(), count)), 0)
     is_sized = len(sides_in(lines[:first])) == 2
@@ -200,8 +198,8 @@ def _grid(table: Field) -> tuple[Field, tuple[float, ...], str]:
     for same in SAME_POSITION:
         indices: Any = np.column_stack([_index(axis, same) for axis in positions.T])
         nx, ny = (int(last) + 1 for last in indices.max(axis=0))
-        is_distinct = len(np.unique(indices @ [1, nx])) == len(table)
-        if min(nx, ny) > 1 and is_distinct and len(table) >= MIN_PRESENT * nx * ny:
+        is_full = min(nx, ny) > 1 and len(table) >= MIN_PRESENT * nx * ny
+        if is_full and np.bincount(indices @ [1, nx]).max() == 1:
             candidates.append((nx * ny - len(table), (ny, nx), indices))
     if not candidates:
         points, counts = np.unique(positions, axis=0, return_counts=True)

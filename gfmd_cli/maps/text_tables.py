@@ -41,6 +41,18 @@ WHOLE = re.compile(rb"[-+]?\d{1,3}")
 MIN_POINTED = 50  # numbers such as 1.023: of fewer, all may have three decimals by chance
 NUMBER_CHARACTERS = b' "\t+-.,;0123456789eEdDinfaINFA'
 """Characters of lines without words."""
+BLANK, LINE_END, DIGIT, LETTER = range(4)
+KINDS = bytes(
+    BLANK
+    if byte in b" \t"
+    else LINE_END
+    if byte in b"\r\n"
+    else DIGIT
+    if byte in NUMBER_CHARACTERS
+    else LETTER
+    for byte in range(256)
+)
+"""The kind of each byte: `DIGIT` for those of numbers, `LETTER` for those of words alone."""
 UTF_16 = codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE
 QUOTED_COMMAS = re.compile(rb'"[-+\d]*,[\d,.]*"[ \t]*,')  # beside commas between the numbers
 GROUPED = re.compile(rb"[\t;]([-+]?\d{1,3}( \d{3})+([,.]\d*)?)(?=[\t;\r]|$)")
@@ -71,25 +83,24 @@ def is_numeric(line: bytes) -> bool:
     return not line.translate(None, NUMBER_CHARACTERS)
 
 
-def table_formats(file: BinaryIO) -> set[str]:
-    """The formats of tables that a file can have.
+def table_formats(file: BinaryIO, width: int) -> set[str]:
+    """The formats of tables that a file of so many columns can have.
 
     "asc" is a matrix of heights between blanks; "xyz" are the positions and heights of a profile or
     of points on a grid, between blanks, commas or semicolons.
     """
-    width = columns(file)
     if width >= MATRIX_COLUMNS:
         return {"asc"}
     return {"xyz"} if width == 2 or (width == 3 and _is_grid(file)) else set()
 
 
 def is_number(word: bytes) -> bool:
-    """Whether a word is a number, NaN or infinite."""
+    """Whether a word is a number, NaN or infinite; 1_000 is one in Python alone."""
     try:
         float(word)
     except ValueError:
         return False
-    return True
+    return b"_" not in word
 
 
 def is_height(word: bytes) -> bool:
@@ -135,9 +146,8 @@ def unread_units(lines: list[bytes], *, of_sides: bool) -> str:
     )
 
 
-def without_size(file: BinaryIO) -> BinaryIO:
+def without_size(file: BinaryIO, width: int) -> BinaryIO:
     """A matrix without a first line that states its numbers of rows and columns."""
-    width = columns(file, b" \t")
     file.seek(0)
     size = [int(word) for word in file.readline(SIZE_BYTES).split() if word.isdigit()]
     if len(size) == 2 and width in size and width >= MATRIX_COLUMNS:
@@ -376,17 +386,25 @@ def _windows(file: BinaryIO) -> Iterator[tuple[int, bytes]]:
 
 def _counts(lines: bytes) -> np.ndarray[Any, np.dtype[np.int64]]:
     """Numbers between blanks in each line, 0 where there are words."""
-    counts = [len(line.split()) if is_numeric(line) else 0 for line in lines.splitlines()]
-    return np.array(counts, np.int64)
+    if not lines.endswith((b"\n", b"\r")):
+        lines += b"\n"
+    kinds = np.frombuffer(lines.replace(b"\r\n", b"\n").translate(KINDS), np.uint8)
+    begins = kinds >= DIGIT
+    begins[1:] &= kinds[:-1] < DIGIT
+    first = np.append(0, np.flatnonzero(kinds[:-1] == LINE_END) + 1)
+    counts = np.add.reduceat(begins, first, dtype=np.int64)
+    counts[np.maximum.reduceat(kinds, first) == LETTER] = 0
+    return counts
 
 
 def _is_grid(file: BinaryIO) -> bool:
     """Whether three columns can be points on a grid: few different positions, in some lines."""
     size = file.seek(0, os.SEEK_END)
+    blanks = bytes.maketrans(b",;", b"  ")
     for position, lines in _windows(file):
-        rows = [re.split(rb"[\s,;]+", line.strip()) for line in lines.splitlines()[-GRID_LINES:]]
-        values = [{row[axis] for row in rows if len(row) == 3} for axis in range(3)]
-        x, y = sorted(map(len, values))[:2]  # whatever their order
+        rows = lines.translate(blanks).splitlines()[-GRID_LINES:]
+        words = list(chain(*(row for row in map(bytes.split, rows) if len(row) == 3)))
+        x, y = sorted(len(set(words[axis::3])) for axis in range(3))[:2]  # whatever their order
         points = size / len(lines) * lines.count(b"\n" if b"\n" in lines else b"\r")
         if position + len(lines) == size and len(rows) < GRID_LINES:
             return True  # a small file, which is read soon

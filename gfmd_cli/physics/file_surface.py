@@ -46,7 +46,7 @@ from gfmd_cli.maps.pictures import Picture, picture
 from gfmd_cli.maps.tip import blunted
 from gfmd_cli.maps.topography import Region, Topography, read_topography
 from gfmd_cli.physics.indenters import SMALLEST_GRID, RigidSurface
-from gfmd_cli.spec_table import FilePath, Positive
+from gfmd_cli.spec_table import FilePath, Positive, Scale
 from gfmd_cli.units import count, labelled
 
 SHOWN_ROUNDING = 1e-5  # of a length that a message shows with six digits
@@ -112,12 +112,12 @@ class FileSurface(RigidSurface):
     """Interpolation on grids finer than the map: "fourier", exact for band-limited maps, or
     "monotone", without overshoot. The default depends on the spectrum, the plateaus and the steps
     of the map."""
-    scale: Positive = 1.0
+    scale: Scale = 1.0
     """Factor from the heights of the file to metres; also for its side if it states no unit."""
-    length: Positive | None = None
+    length: Scale | None = None
     """Side of the map along x [m]; with a region or cropped, of the part that is used. By default
     that of the file, or 1 if the file states none."""
-    length_y: Positive | None = None
+    length_y: Scale | None = None
     """Side of the map along y [m]; by default that of the file, else the points along y times the
     spacing along x."""
 
@@ -172,7 +172,12 @@ class FileSurface(RigidSurface):
         return round(points * self.smallest_grid_y() / self.smallest_grid())
 
     def on_cell(self, points: int, points_y: int) -> Self:
-        """The map itself, whose cell does not depend on the grid."""
+        """The map itself, whose cell does not depend on the grid.
+
+        Raises InputError where one side is very much longer than the other.
+        """
+        if self.dimension == 2:
+            self._checked_sides()
         return self
 
     def heights_on(self, grid: Grid) -> Field:

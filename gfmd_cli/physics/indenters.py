@@ -18,11 +18,11 @@ from gfmd_cli.grid.arrays import Field, Mask, MaskedField
 from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.maps.pictures import Picture
 from gfmd_cli.physics.highest_point import highest_point, highest_point_of_mirrored
-from gfmd_cli.spec_table import Positive, SpecTable
+from gfmd_cli.spec_table import Positive, Scale, SpecTable
 
 SMALLEST_GRID = 8  # points along an axis; a choice: smaller grids resolve no contact
 MAX_POINTS = 2**17  # along an axis; upper limit, guards against typing errors
-MAX_ASPECT_RATIO = 1e9  # side along y over side along x; a choice: no grid has so many points
+MAX_ASPECT_RATIO = 1e9  # of the sides; a choice: no grid has so many points
 SLOPE_STEP = 1e-3  # of a distance from the middle, over which a slope is taken
 POINTS_ROUNDING = 1e-9  # of a number of points that follows from a ratio of sides
 UNCOUNTABLE = 1e15  # points along an axis; what would need more, or infinitely many, counts as this
@@ -74,9 +74,9 @@ class RigidSurface(SpecTable):
         return max(SMALLEST_GRID, whole_points(self.smallest_grid() * length_y / length))
 
     def _checked_sides(self) -> tuple[float, ...]:
-        """The sides. Raises InputError where no grid has so many points along y."""
+        """The sides. Raises InputError where one is very much longer than the other."""
         length_y, length = self.sides
-        if length_y / MAX_ASPECT_RATIO > length:
+        if not 1 / MAX_ASPECT_RATIO <= length_y / length <= MAX_ASPECT_RATIO:
             raise InputError(
                 f"surface.length_y = {length_y:g} m is out of range: the side along x has "
                 f"{length:g} m"
@@ -94,11 +94,14 @@ class RigidSurface(SpecTable):
         """The surface on the cell that it has on a grid of so many points.
 
         Where the spec does not give the side along y, it is the points along y times the spacing
-        along x.
+        along x. Raises InputError where one side is very much longer than the other.
         """
-        if self.dimension == 1 or points_y == points or dict(self).get("length_y") is not None:
+        if self.dimension == 1:
             return self
-        return self.model_copy(update={"length_y": self.sides[-1] * points_y / points})
+        _, length = self._checked_sides()
+        if points_y == points or dict(self).get("length_y") is not None:
+            return self
+        return self.model_copy(update={"length_y": length * points_y / points})
 
     def heights_on(self, grid: Grid) -> Field:
         """Heights h [m] at the points of a grid that this process holds, shape `grid.shape`."""
@@ -222,7 +225,7 @@ class SingleIndenter(RigidSurface):
     """A single indenter in the middle of the cell, repeated periodically; x counts from there."""
 
     x_first: ClassVar[float] = -0.5
-    length: Positive = 1.0
+    length: Scale = 1.0
     """Side of the cell along x, L [m]."""
 
     def smallest_grid(self) -> int:
@@ -258,7 +261,7 @@ class SingleIndenter(RigidSurface):
 class RoundIndenter(SingleIndenter):
     """A single indenter of revolution in the middle of the cell, h(r)."""
 
-    length_y: Positive | None = None
+    length_y: Scale | None = None
     """Side of the cell along y [m]; by default the points along y times the spacing along x."""
 
 

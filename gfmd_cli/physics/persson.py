@@ -289,7 +289,7 @@ def _panel_edges(p: Field, delta_sigma: float) -> Field:
     """
     if not p.size:
         return np.array([1.0, 1.0])
-    highest = min(p.max() / delta_sigma, UNDERFLOW)
+    highest = min(float(p.max() / delta_sigma), UNDERFLOW)
     y_end = min(0.5 * highest**2 + 40, 745)  # exp(-40) < eps; exp(-745) is 0
     end = delta_sigma * np.sqrt(2 * y_end)
     start = min(p.min(), end)

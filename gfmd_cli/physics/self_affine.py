@@ -14,7 +14,7 @@ from gfmd_cli.errors import InputError
 from gfmd_cli.grid.arrays import Field, Modes
 from gfmd_cli.grid.fft_grid import Grid
 from gfmd_cli.physics.indenters import MAX_POINTS, SMALLEST_GRID, UNCOUNTABLE, RigidSurface
-from gfmd_cli.spec_table import Positive, Seed
+from gfmd_cli.spec_table import Positive, Scale, Seed
 
 LARGEST_ROLLOFF = 1e6
 """Largest lambda_r / L. It is above the longest wave of every cell."""
@@ -44,9 +44,9 @@ class SelfAffine(RigidSurface):
     """Seed of the random phases."""
     h_std: Positive | None = None
     """Root-mean-square height [m]; by default the prefactor of C is 1 m^2."""
-    length: Positive = 1.0
+    length: Scale = 1.0
     """Side of the cell along x, L [m]."""
-    length_y: Positive | None = None
+    length_y: Scale | None = None
     """Side of the cell along y [m]; by default the points along y times the spacing along x."""
 
     @model_validator(mode="after")

@@ -273,5 +273,6 @@ def _without_tension(t: Field) -> Field:
 
 def _energy(factor: Field, s: Field) -> float:
     """Twice the elastic energy s C s of stresses, with the factor U of C = U^T U."""
-    strain = scipy.linalg.blas.dtrmv(factor, s)
+    dtrmv: Any = scipy.linalg.blas.dtrmv  # its stub wants arrays whose types state the dimension
+    strain = dtrmv(factor, s)
     return float(np.vdot(strain, strain))

@@ -43,8 +43,11 @@ MIN_LENGTH = 1e-18
 the energy rise along a longer move, one as short as that sets them to zero."""
 MAX_FRACTION = 100.0
 """Upper limit of the fraction `best` of a move. If a move consists of rounding only, `best` can be
-1e5, and would multiply the rounding error of the load as much. A choice: mostly `best` is about 1.
+1e5, and would multiply the rounding error of the gap as much. A choice: mostly `best` is about 1.
 """
+MAX_STRESS_FRACTION = 2.0
+"""Largest fraction f of a move that is added to the stress: a relative rounding error of the load
+is multiplied by 1 - f. If f is larger, the stress is projected anew, with the length f l."""
 CONVOLUTION_ROUNDING = 2.0
 """Relative rms error of the coefficients of a move and of its displacement, in units of eps.
 
@@ -254,7 +257,12 @@ class _Run:
         state.length *= factor
         if restart:
             state.slope = 0.0
-        fields = self.sigma, self.gap, *way, fraction, *self.chosen, self.change
+        stress_fraction = fraction
+        if fraction > MAX_STRESS_FRACTION:
+            highest, shift, _ = self.project()
+            way, stress_fraction = (self.direction, state.length, highest, shift), 1.0
+            self.change *= np.float32(fraction)
+        fields = self.sigma, self.gap, *way, stress_fraction, *self.chosen, self.change
         sums = self.rows.sums(2, kernels.advance, *fields)  # [5]
         state.residual = self.contact.balance(state.sigma, state.gap, state.u, sums)
         squares = fraction**2 * moved, fraction**2 * changed

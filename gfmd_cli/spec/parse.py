@@ -37,6 +37,7 @@ def read_spec(path: Path, overrides: tuple[str, ...] = ()) -> tuple[Spec, str]:
 
     Returns the spec and the text of the file. Raises InputError with all that is wrong.
     """
+    check_distinct(overrides)
     try:
         with open_regular(path, follow=True) as file:
             raw = file.read(MAX_BYTES + 1)
@@ -133,6 +134,18 @@ def _is_deep(data: Any, depth: int = MAX_DEPTH) -> bool:
         return False
     inner = data.values() if isinstance(data, dict) else data
     return depth == 0 or any(_is_deep(each, depth - 1) for each in inner)
+
+
+def check_distinct(overrides: tuple[str, ...]) -> None:
+    """Raise InputError for two overrides of one key, and for two loads."""
+    given: dict[str, str] = {}
+    for override in overrides:
+        key = override.partition("=")[0].strip()
+        key = "load" if key.removeprefix("load.") in LOADS else key
+        if (earlier := given.setdefault(key, override)) != override:
+            raise InputError(
+                f"--set {override}: takes the place of --set {earlier}; give one of them"
+            )
 
 
 def split_override(override: str) -> tuple[list[str], Any]:

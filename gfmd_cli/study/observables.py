@@ -125,7 +125,7 @@ OPTIONAL_OBSERVABLES = (
     OptionalObservable(
         "patches",
         Column("patch_area_mean", "mean area of a patch / L^2; in a line contact, / L"),
-        lambda solved: solved.patch_areas.mean() if solved.patch_areas.size else None,
+        lambda solved: float(solved.patch_areas.mean()) if solved.patch_areas.size else None,
         "mean patch",
         PATCH_AREA,
         PATCH_LENGTH,
@@ -133,7 +133,7 @@ OPTIONAL_OBSERVABLES = (
     OptionalObservable(
         "patches",
         Column("patch_area_largest", "area of the largest patch, in the same units"),
-        lambda solved: solved.patch_areas.max() if solved.patch_areas.size else None,
+        lambda solved: float(solved.patch_areas.max()) if solved.patch_areas.size else None,
         "largest patch",
         PATCH_AREA,
         PATCH_LENGTH,

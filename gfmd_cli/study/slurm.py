@@ -112,6 +112,11 @@ def batch(
     named_options, sbatch_options : options of sbatch, by name and as they are
     """
     path = progress.study.with_suffix(SUFFIX)
+    for name, value in named_options.items():
+        if not value.strip():
+            raise InputError(f"--{name} {value!r}: is empty; give a value, or leave it out")
+    if "mem" in named_options:
+        _check_memory(named_options["mem"])
     limit = time_limit(named_options["time"]) if "time" in named_options else None
     options = [option(f"{name}={value}") for name, value in named_options.items()]
     options += [option(word) for word in sbatch_options]
@@ -204,6 +209,15 @@ def time_limit(text: str) -> float | None:
     seconds = 86400 * int(days or 0)
     seconds += sum(n * unit for n, unit in zip(parts, (3600, 60, 1), strict=False))
     return float(seconds) or None
+
+
+def _check_memory(text: str) -> None:
+    """Raise InputError for a size that Slurm does not take; it ignores the B in 8GB."""
+    if not re.fullmatch(r"\d+([KMGT]B?)?", text, re.ASCII | re.IGNORECASE):
+        raise InputError(
+            f"--mem {text}: write a whole number of megabytes, or one with the unit K, M, G or T, "
+            "such as 8G"
+        )
 
 
 def option(text: str) -> str:
