@@ -8,7 +8,7 @@ from gfmd_cli.physics.contact import Contact
 from gfmd_cli.physics.elastomers import Power, Tabulated
 from gfmd_cli.physics.scenes import build_scene, reduce_scene
 from gfmd_cli.physics.self_affine import SelfAffine
-from gfmd_cli.solvers import direct_start
+from gfmd_cli.solvers import direct_start, multigrid
 from gfmd_cli.solvers import multigrid_transfer_kernels as kernels
 from gfmd_cli.solvers.auto import Auto
 from gfmd_cli.solvers.contact_state import PRESSED, TENSILE
@@ -141,6 +141,85 @@ def test_symmetric_and_positive_on_a_line(n, points, held):
     assert np.allclose(matrix, matrix.T, rtol=0, atol=1e-5 * np.abs(matrix).max())
     values = np.linalg.eigvalsh((matrix + matrix.T) / 2)
     assert values[0] > 1e-6 * values[-1]
+
+
+def penalty_matrix(penalty):
+    """The matrix of a penalty from its elements; a diagonal one counts for both diagonals."""
+    own, east, south, cross = (penalty[:, kind, 1:].astype(float) for kind in range(4))
+    here = np.arange(own.size).reshape(own.shape)
+    right, below = np.roll(here, -1, 1), np.roll(here, -1, 0)
+    matrix = np.diag(own.ravel())
+    pairs = (here, right, east), (here, below, south)
+    for one, other, values in (*pairs, (here, np.roll(right, -1, 0), cross), (right, below, cross)):
+        np.add.at(matrix, (one, other), values)
+        np.add.at(matrix, (other, one), values)
+    return matrix
+
+
+@pytest.mark.parametrize("n", [0.5, 1, 1.5])
+@pytest.mark.parametrize(("shape", "length_y"), [((64, 64), 1.0), ((63, 65), 1.0), ((64, 96), 0.5)])
+@pytest.mark.parametrize("kind", ["points", "sparse", "disc"])
+def test_long_waves_are_solved_with_the_stiffness_itself(kind, shape, length_y, n, monkeypatch):
+    """On one level, against a dense solve."""
+    monkeypatch.setattr(multigrid, "MIN_LONG_WAVE_POINTS", 8)
+    monkeypatch.setattr(multigrid, "LONG_WAVE_STEPS", 40)
+    state, case = pattern(kind, shape), contact(n, shape, length_y)
+    cycle = Multigrid(case, case.grid)
+    cycle.apply(np.ones(shape), state, PRESSED, np.zeros(shape, np.float32))
+    long_waves = cycle.solve_rest.__self__
+    grid, level = long_waves.grid, long_waves.levels[0]
+    force = np.random.default_rng(9).normal(size=grid.shape)
+    level.rhs[...] = force
+    long_waves.solve()
+    k = Power(n=n).stiffness(grid.wavenumber(), 1.0)
+    k /= Power(n=n).stiffness(case.grid.wavenumber(), 1.0).max()
+    points = np.eye(grid.size).reshape(-1, *grid.shape)
+    matrix = np.fft.irfft2(np.fft.rfft2(points) * k, grid.shape).reshape(grid.size, -1)
+    units = multigrid._levels(case)[len(cycle.finer)]
+    matrix *= case.grid.size / grid.size / units.scale
+    factor = min(1.0, 0.5 * units.growth - 0.4)
+    matrix += factor * float(level.operator.penalty_scale) * penalty_matrix(level.penalty)
+    expected = np.linalg.solve(matrix, force.ravel())
+    assert level.y.ravel() == pytest.approx(expected, abs=1e-4 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("threads", [2, 3])
+def test_long_waves_are_the_same_on_any_number_of_threads(threads, monkeypatch):
+    monkeypatch.setattr(multigrid, "MIN_LONG_WAVE_POINTS", 64)
+    state = (2 * (np.random.default_rng(5).random((512, 512)) < 0.02)).astype(np.int8)
+    force = np.random.default_rng(6).normal(size=state.shape)
+    assert np.array_equal(applied(1, state, force, threads), applied(1, state, force))
+    without = applied(1.9, state, force, threads), applied(1.9, state, force)
+    assert np.array_equal(*without)
+
+
+def test_where_long_waves_are_solved_apart():
+    """On large grids, where k(q) grows slowly; the level has an eighth of the points a side."""
+    for n, points, expected in ((1, 1024, 128), (1.5, 1024, 128), (1, 1020, 128), (1, 1600, 200)):
+        cycle = Multigrid(contact(n, points), Grid(points))
+        assert cycle.solve_rest.__self__.grid.points == expected
+    for n, points in ((1, 512), (1, 1000), (2, 1024)):
+        cycle = Multigrid(contact(n, points), Grid(points))
+        assert len(cycle.finer) == 1
+
+
+def test_the_mean_gap_converges_faster_where_long_waves_are_solved_apart(monkeypatch):
+    """Its error after three steps on the finest grid is a tenth; long waves determine it."""
+    monkeypatch.setattr(multigrid, "MIN_LONG_WAVE_POINTS", 32)
+    case = build_scene(SelfAffine(cutoff=0.0156, seed=6), Power(n=1), 256).contact(0.1)
+    gaps = {}
+
+    def watch(current, state):
+        if current is case:
+            gaps[state.step] = float(np.mean(state.u - case.height))
+
+    exact = solve_contact(case, Auto(tolerance=1e-8))
+    mean_gap, errors = float(np.mean(exact.u - case.height)), []
+    for growth in (multigrid.MAX_LONG_WAVE_GROWTH, 0.0):
+        monkeypatch.setattr(multigrid, "MAX_LONG_WAVE_GROWTH", growth)
+        solve_contact(case, Auto(tolerance=1e-5), watch)
+        errors.append(abs(gaps[3] / mean_gap - 1))
+    assert errors[0] < 0.3 * errors[1]
 
 
 def hats(fine, coarse):

@@ -22,10 +22,16 @@ and only the direction of strong coupling is coarsened until the pixels are abou
 (semi-coarsening; Trottenberg, Oosterlee & Schueller, Multigrid, 2001, section 5.1). A line is one
 row of pixels without coupling along y.
 
-The cycle is symmetric. It is positive as long as the eigenvalues of the damped Jacobi iteration,
-the damping times A over its diagonal, are below 2. Without a penalty `JACOBI_EIGENVALUE` gives the
-largest. The penalty does not increase it, because it acts on waves for which the operator is soft.
-The weight of a correction may be any positive number.
+Between contacts, the V-cycle moves waves that are longer than the distances of the contacts too
+little. Such waves hardly change the residual, but determine the mean gap. Therefore, on large grids
+and where k(q) is not steep, one coarse level and those below it do more than a V-cycle: there it
+preconditions two steps of conjugate gradients for K itself (`_LongWaves`), with a softer penalty.
+
+Without these steps the cycle is symmetric. With them it is nearly so, which suffices for `pcg`. The
+cycle is positive as long as the eigenvalues of the damped Jacobi iteration, the damping times A
+over its diagonal, are below 2. Without a penalty `JACOBI_EIGENVALUE` gives the largest. The penalty
+does not increase it, because it acts on waves for which the operator is soft. The weight of a
+correction may be any positive number.
 """
 
 from collections.abc import Callable, Iterator
@@ -80,13 +86,20 @@ STEEPEST = 4.5  # exponent above which the levels limit the growth of k(q): `_wi
 COARSEST_STEP_PAIRS = 4  # of smoothing steps on the coarsest level
 """With 1, 2 and 8, 4 % fewer to 5 % more:
 `multigrid.COARSEST_STEP_PAIRS 1 2 8 --exponents 1 2 3 4`."""
-LONG_WAVE_FRACTION = 0.02  # largest number of points over that of the grid; an eighth a side
-"""With 0.07 and 0.005: `multigrid.LONG_WAVE_FRACTION 0.07 0.005 --points 1024 --exponents 0.5 1
-1.5`: TODO."""
-LONG_WAVE_STEPS = 2  # of conjugate gradients
-MIN_LONG_WAVE_POINTS = 128  # of the level, along the shorter side; on smaller ones no time is saved
-MAX_LONG_WAVE_GROWTH = 3.0  # of k(q) per octave, up to which long waves converge more slowly
-LONG_WAVE_PENALTY = (-0.4, 0.5), (1.0, 0.0)  # factor of the penalty, as lines (a, b) likewise
+LONG_WAVE_FRACTION = 0.02  # of the points: an eighth a side
+"""With 0.07 the transforms are 0.96 to 1.02 times as many, in steps that take longer; with 0.005:
+1.03 to 1.20 times (n = 0.5 to 1.5; the options for this and the next constants are
+`multigrid.LONG_WAVE_FRACTION 0.07 0.005 --points 1024 --exponents 0.5 1 1.5 --p-star 0.03 0.1
+0.5`)."""
+LONG_WAVE_STEPS = 2
+"""With 1 the transforms are 1.00 to 1.16 times as many, with 3: 0.96 to 1.00 times."""
+MIN_LONG_WAVE_POINTS = 128  # along the shorter side of the level; with fewer no time is saved
+MAX_LONG_WAVE_GROWTH = 3.0  # of k(q) per octave
+"""Without the steps (0) the transforms are 1.03 to 1.20 times as many; at n = 2 and 3 they would
+save none (20)."""
+LONG_WAVE_PENALTY = (-0.4, 0.5), (1.0, 0.0)
+"""Factor of the penalty, as lines (a, b) likewise. If it is 1 ("((1, 0),)"), the transforms are
+1.00 to 1.05 times as many, and the mean gap converges more slowly (docs/solver_measurements.md)."""
 PENALTY_UNIT = 1.0 / 64  # of the integers in `_CoarseLevel.penalty`
 
 
@@ -316,7 +329,8 @@ def _v_cycle(levels: list[_CoarseLevel]) -> None:
 class _LongWaves:
     """Conjugate gradients for K itself and the penalty on one coarse level.
 
-    The V-cycle from this level on is the preconditioner. `grid` has the points of the level.
+    They are preconditioned by the V-cycle from this level on. `grid` has the points of the level,
+    and `fields` are those of this level and the coarser ones.
     """
 
     def __init__(self, contact: Contact, grid: Grid, level: Level, fields: list[_CoarseLevel]):
@@ -331,6 +345,7 @@ class _LongWaves:
         zeros = partial(level.rows.empty_with_halo, grid.points, dtype=np.float32)
         self.direction, self.change = zeros(), zeros()
 
+    @np.errstate(over="ignore", invalid="ignore")  # `pcg` sees whether a solve diverges
     def solve(self) -> None:
         """Compute `y` of the level from its `rhs`, which is overwritten by the residual."""
         first = self.levels[0]
@@ -339,9 +354,11 @@ class _LongWaves:
         result, curvature = np.zeros_like(z), 0.0
         for _ in range(LONG_WAVE_STEPS):
             _v_cycle(self.levels)
-            beta = self.grid.dot(z, change) / curvature if curvature else 0.0
-            direction *= np.float32(beta)
-            direction += z
+            if curvature > 0:
+                direction *= np.float32(self.grid.dot(z, change) / curvature)
+                direction += z
+            else:
+                direction[...] = z
             self._compute_change()
             curvature = -self.grid.dot(direction, change)
             if not curvature > 0:
@@ -368,8 +385,6 @@ class _LongWaves:
 class Multigrid:
     """The preconditioner of one contact."""
 
-    transforms = 0
-
     def __init__(self, contact: Contact, grid: Grid) -> None:
         self.z = grid.as_rows(grid.padded)
         levels = _levels(contact)
@@ -379,10 +394,13 @@ class Multigrid:
         self.coarse = list(starmap(_CoarseLevel, pairwise(levels)))
         self.finer = self.coarse[:1]
         self.solve_rest: Callable[[], None] = partial(_v_cycle, self.coarse)
+        self.transforms = 0.0
         if (found := _level_of_long_waves(contact, levels)) is not None:
             number, level_grid = found
             self.finer, rest = self.coarse[:number], self.coarse[number - 1 :]
             self.solve_rest = _LongWaves(contact, level_grid, levels[number], rest).solve
+            pairs = LONG_WAVE_STEPS * level_grid.size / contact.grid.size
+            self.transforms = level_grid.pair_cost * pairs
 
     def apply(
         self, sigma: Field, contact_state: ContactState, threshold: int, change: Field

@@ -4,7 +4,8 @@
   displacement at distances of a few patches. Waves longer than that are therefore not softer than
   k(q_c). With the plain Green's function 1 / k(q), the method degrades at n = 2 and fails from
   n = 3 on.
-- The V-cycle of `multigrid` takes the contact points into account and needs no transform.
+- The V-cycle of `multigrid` takes the contact points into account and needs no transform of the
+  whole grid.
 """
 
 from typing import Protocol
@@ -30,7 +31,7 @@ class Preconditioner(Protocol):
 
     z: Field
     """The preconditioned force, which `apply` writes; rows as of `Grid.padded`."""
-    transforms: int
+    transforms: float
     """Transforms in double precision that take as long as those of one application."""
 
     def apply(
@@ -50,7 +51,7 @@ class GreensFunction:
         self.grid, self.rows = grid, contact.grid.rows
         self.stiffness, self.screening = contact.stiffness, screening
         self.z = grid.as_rows(grid.padded)
-        self.transforms = grid.pair_cost
+        self.transforms = float(grid.pair_cost)
 
     def apply(
         self, sigma: Field, contact_state: ContactState, threshold: int, change: Field

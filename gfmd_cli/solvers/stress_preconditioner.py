@@ -49,14 +49,14 @@ class StressPreconditioner:
         self.stress = np.zeros(self.values.shape, np.float32)
         self.response = np.zeros_like(self.stress)  # K times the last direction
         self.contact_state = self.cell.rows.empty_with_halo(self.cell.points, dtype=np.int8)
-        self.cycles = 0
+        self.cycles, cost = 0, float(self.cell.pair_cost)
         if has_coarser_level(self.cell):
             periodic = Contact(self.cell, np.empty(0), self.stiffness, contact.pressure)
             self.multigrid = Multigrid(periodic, self.cell)
             self.cycles = CYCLES[largest_growth(periodic) > MAX_GROWTH]
-        pairs = (1 + self.cycles) * self.cell.size / self.map.size
-        self.transforms = self.cell.pair_cost * pairs
-        """Cost of `apply` in transforms of the size of the map, without the V-cycle."""
+            cost += self.cycles * (self.cell.pair_cost + self.multigrid.transforms)
+        self.transforms = cost * self.cell.size / self.map.size
+        """Cost of `apply` in transforms of the size of the map."""
 
     def apply(
         self, displacement: Field, contact_state: ContactState, threshold: int, out: SingleField

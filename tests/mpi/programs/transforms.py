@@ -16,6 +16,7 @@ from gfmd_cli.physics.indenters import Cone
 from gfmd_cli.physics.scenes import build_scene
 from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.physics.waves import texture
+from gfmd_cli.solvers import multigrid
 from gfmd_cli.solvers.contact_state import PRESSED
 from gfmd_cli.solvers.multigrid import Multigrid
 
@@ -113,7 +114,7 @@ def check_surfaces(points):
         np.testing.assert_allclose(many, one, rtol=1e-10)
 
 
-def check_v_cycle(points, n):
+def check_v_cycle(points, n, has_long_waves=False):
     """The V-cycle is the same on row blocks as on one process, for any pattern of contacts."""
     draw = np.random.default_rng(4)
     force = draw.standard_normal((points, points))
@@ -128,6 +129,7 @@ def check_v_cycle(points, n):
             grid.rows.interior(with_halo)[...] = state[grid.own]
             change = np.ones(grid.shape, np.float32)
             v_cycle = Multigrid(contact, grid)
+            assert (len(v_cycle.finer) > 1) == has_long_waves
             sums = v_cycle.apply(-force[grid.own], with_halo, PRESSED, change)
             results.append((v_cycle.z[:, :points], sums))
         (whole, sums), (mine, others) = results
@@ -189,5 +191,8 @@ for tiling in ((64, 1, 0), (33, 1, 1), (50, 2, 0), (40, 1, 2), (32, 3, 2)):
     check_textures(*tiling)
 for size, exponent in ((64, 1), (96, 2), (128, 3), (160, 4), (88, 2)):
     check_v_cycle(size, exponent)
+multigrid.MIN_LONG_WAVE_POINTS = 8
+for size in (64, 128, 256):  # the level of long waves is shared, or held by every process
+    check_v_cycle(size, 1, has_long_waves=True)
 check_against_mpi4py_fft(64)
 sys.exit(0)
