@@ -392,7 +392,7 @@ def test_a_solver_that_diverges_ends_the_search_on_a_grid(
 @pytest.mark.parametrize("seed", [0, 3])
 def test_a_mean_gap_above_those_of_coarser_grids_is_found(rows_of, spec_of, seed):
     """Without load the gap is the highest point, which is lower on a coarser grid."""
-    words = (f"surface.seed={seed}", "grid.points=128", "load.mean_gap=1")
+    words = (f"surface.seed={seed}", "grid.points=128")
     (task,) = plan(spec_of(*words))
     coarse, fine = (build_scene(task.surface, task.elastomer, n).highest for n in (64, 128))
     load = 0.5 * (coarse + fine)

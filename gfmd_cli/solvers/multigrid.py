@@ -88,18 +88,17 @@ COARSEST_STEP_PAIRS = 4  # of smoothing steps on the coarsest level
 `multigrid.COARSEST_STEP_PAIRS 1 2 8 --exponents 1 2 3 4`."""
 LONG_WAVE_FRACTION = 0.02  # of the points: an eighth a side
 """With 0.07 the transforms are 0.96 to 1.02 times as many, in steps that take longer; with 0.005:
-1.03 to 1.20 times (n = 0.5 to 1.5; the options for this and the next constants are
-`multigrid.LONG_WAVE_FRACTION 0.07 0.005 --points 1024 --exponents 0.5 1 1.5 --p-star 0.03 0.1
-0.5`)."""
+1.09 to 1.20 times. The options for this and the next constants are `multigrid.LONG_WAVE_FRACTION
+0.07 0.005 --points 1024 --exponents 0.5 1 --p-star 0.03 0.1 0.5`."""
 LONG_WAVE_STEPS = 2
-"""With 1 the transforms are 1.00 to 1.16 times as many, with 3: 0.96 to 1.00 times."""
+"""With 1 the transforms are 1.15 times as many, with 3: 0.96 to 0.99 times."""
 MIN_LONG_WAVE_POINTS = 128  # along the shorter side of the level; with fewer no time is saved
-MAX_LONG_WAVE_GROWTH = 3.0  # of k(q) per octave
-"""Without the steps (0) the transforms are 1.03 to 1.20 times as many; at n = 2 and 3 they would
-save none (20)."""
-LONG_WAVE_PENALTY = (-0.4, 0.5), (1.0, 0.0)
-"""Factor of the penalty, as lines (a, b) likewise. If it is 1 ("((1, 0),)"), the transforms are
-1.00 to 1.05 times as many, and the mean gap converges more slowly (docs/solver_measurements.md)."""
+MAX_LONG_WAVE_GROWTH = 2.5  # of k(q) per octave; n = 1.3
+"""Without the steps (0) the transforms are 1.09 to 1.20 times as many. For steeper k(q) they save
+no time (docs/solver_measurements.md)."""
+LONG_WAVE_PENALTY = ((-0.4, 0.5),)
+"""Factor of the penalty, as a line (a, b) likewise. With 1, "((1, 0),)", the transforms are 1.03 to
+1.05 times as many."""
 PENALTY_UNIT = 1.0 / 64  # of the integers in `_CoarseLevel.penalty`
 
 

@@ -22,8 +22,12 @@ from gfmd_cli.solvers.multigrid import Multigrid, has_coarser_level
 V_CYCLE_EXPONENT = {1: 2.7, 2: 0.45}
 """Exponent of k(q) above which the V-cycle is faster than the Green's function, by the dimension.
 
-Measured. On lines a transform is cheap: at n = 3 both take as long at 8192 points. At n = 4 the
-Green's function takes up to 1200 steps at 2048 points, and thousands beyond."""
+Measured. At n = 0.5 the Green's function takes 1.7 times as many transforms on 256^2 and 2.1 times
+on 1024^2 (`scripts/solver_constants.py preconditioners.V_CYCLE_EXPONENT "{1: 2.7, 2: 0.7}" --points
+256 1024 --exponents 0.5`), and about as much time on small grids of smooth surfaces, half as much
+where the pixels are oblong (`scripts/grid_shapes.py --exponents 0.5`, also with
+`--without-v-cycle`). On lines a transform is cheap: at n = 3 both take as long at 8192 points. At
+n = 4 the Green's function takes up to 1200 steps at 2048 points, and thousands beyond."""
 
 
 class Preconditioner(Protocol):
