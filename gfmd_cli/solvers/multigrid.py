@@ -24,14 +24,14 @@ row of pixels without coupling along y.
 
 Between contacts, the V-cycle moves waves that are longer than the distances of the contacts too
 little. Such waves hardly change the residual, but determine the mean gap. Therefore, on large grids
-and where k(q) is not steep, one coarse level and those below it do more than a V-cycle: there it
-preconditions two steps of conjugate gradients for K itself (`_LongWaves`), with a softer penalty.
+and where k(q) is not steep, a coarse level is solved by two steps of conjugate gradients for K
+itself and a softer penalty, which are preconditioned by the V-cycle from this level on
+(`_LongWaves`). The result of these steps is not quite linear in the force.
 
-Without these steps the cycle is symmetric. With them it is nearly so, which suffices for `pcg`. The
-cycle is positive as long as the eigenvalues of the damped Jacobi iteration, the damping times A
-over its diagonal, are below 2. Without a penalty `JACOBI_EIGENVALUE` gives the largest. The penalty
-does not increase it, because it acts on waves for which the operator is soft. The weight of a
-correction may be any positive number.
+Without these steps the cycle is symmetric. It is positive as long as the eigenvalues of the damped
+Jacobi iteration, the damping times A over its diagonal, are below 2. Without a penalty
+`JACOBI_EIGENVALUE` gives the largest. The penalty does not increase it, because it acts on waves
+for which the operator is soft. The weight of a correction may be any positive number.
 """
 
 from collections.abc import Callable, Iterator
@@ -72,14 +72,14 @@ PENALTY_STIFFNESS = 0.125, 0.25  # of the Laplacian, of its square
 JACOBI_EIGENVALUE = (1.04, 0.18), (1.76, 0.0)
 """The largest of the damped Jacobi iteration, as lines (a, b): at the growth g = k(2 q) / k(q) this
 is the smallest a + b g. With 1.76 for all k the transforms are 1.19 to 1.48 times as many at
-n = 0.75 and 1, 1.00 to 1.02 times from n = 1.5 on; with 1.6 in place of 1.76: 1.02 to 1.11 times
+n = 0.5 to 1, 1.00 to 1.02 times from n = 1.5 on; with 1.6 in place of 1.76: 1.02 to 1.11 times
 from n = 2 on, with 1.85: 0.93 to 1.00:
 `multigrid.JACOBI_EIGENVALUE "((1.76, 0),)" "((1.04, 0.18), (1.6, 0))" "((1.04, 0.18), (1.85, 0))"
---exponents 0.75 1 1.5 2 3 4`."""
+--exponents 0.5 0.75 1 1.5 2 3 4`."""
 COARSE_WEIGHT = (0.55, 0.19), (1.16, -0.01)
 """Of the correction by the next coarser level, as lines (a, b) likewise. With the weight 1 the
-transforms are 1.04 to 1.10 times as many at n = 0.75, 0.98 to 1.05 times at n = 1 to 2:
-`multigrid.COARSE_WEIGHT "((1, 0),)" --exponents 0.75 1 1.5 2`; at p* = 0.001 and 0.003, 0.92 to
+transforms are 1.04 to 1.20 times as many at n = 0.5 and 0.75, 0.98 to 1.05 times at n = 1 to 2:
+`multigrid.COARSE_WEIGHT "((1, 0),)" --exponents 0.5 0.75 1 1.5 2`; at p* = 0.001 and 0.003, 0.92 to
 1.15 times (`--p-star 0.001 0.003`); at n = 3, 0.99 to 1.02 times. At n = 4 the weight is 1; with
 1.12, 0.97 to 1.00 times: `"((1, 0),)" "((0.55, 0.19), (1.12, 0))" --exponents 3 4`."""
 STEEPEST = 4.5  # exponent above which the levels limit the growth of k(q): `_with_limited_growth`
@@ -87,18 +87,18 @@ COARSEST_STEP_PAIRS = 4  # of smoothing steps on the coarsest level
 """With 1, 2 and 8, 4 % fewer to 5 % more:
 `multigrid.COARSEST_STEP_PAIRS 1 2 8 --exponents 1 2 3 4`."""
 LONG_WAVE_FRACTION = 0.02  # of the points: an eighth a side
-"""With 0.07 the transforms are 0.96 to 1.02 times as many, in steps that take longer; with 0.005:
-1.09 to 1.20 times. The options for this and the next constants are `multigrid.LONG_WAVE_FRACTION
-0.07 0.005 --points 1024 --exponents 0.5 1 --p-star 0.03 0.1 0.5`."""
+"""With 0.07 the transforms are 1.05 to 1.07 times as many, with 0.005: 1.20 to 1.24. The options for this and
+the next constants are `multigrid.LONG_WAVE_FRACTION 0.07 0.005 --points 1024 --exponents 0.5 1
+--p-star 0.0001 0.003 0.03 0.1 0.5`."""
 LONG_WAVE_STEPS = 2
-"""With 1 the transforms are 1.15 times as many, with 3: 0.96 to 0.99 times."""
+"""With 1 the transforms are 1.00 to 1.05 times as many, with 3: 1.00 to 1.01 times."""
 MIN_LONG_WAVE_POINTS = 128  # along the shorter side of the level; with fewer no time is saved
-MAX_LONG_WAVE_GROWTH = 2.5  # of k(q) per octave; n = 1.3
-"""Without the steps (0) the transforms are 1.09 to 1.20 times as many. For steeper k(q) they save
-no time (docs/solver_measurements.md)."""
-LONG_WAVE_PENALTY = ((-0.4, 0.5),)
-"""Factor of the penalty, as a line (a, b) likewise. With 1, "((1, 0),)", the transforms are 1.03 to
-1.05 times as many."""
+MAX_LONG_WAVE_GROWTH = 2.2  # of k(q) per octave; n = 1.1
+"""Without the steps (0) the transforms are 1.20 to 1.24 times as many. With them for all k(q) (20),
+0.96 to 1.02 times at n = 1.25 to 2 (`--exponents 1.25 1.5 2 --p-star 0.03 0.1 0.5`), in steps that
+take longer."""
+LONG_WAVE_PENALTY = 0.3  # factor of the penalty, per growth of k(q)
+"""With 0.2 and 0.4 the transforms are 1.00 to 1.04 times as many, with 0.5: 1.01 to 1.06 times."""
 PENALTY_UNIT = 1.0 / 64  # of the integers in `_CoarseLevel.penalty`
 
 
@@ -326,31 +326,42 @@ def _v_cycle(levels: list[_CoarseLevel]) -> None:
 
 
 class _LongWaves:
-    """Conjugate gradients for K itself and the penalty on one coarse level.
+    """Conjugate gradients for K itself and the penalty, on one coarse level.
 
-    They are preconditioned by the V-cycle from this level on. `grid` has the points of the level,
-    and `fields` are those of this level and the coarser ones.
+    The V-cycle from this level on is their preconditioner. First comes the exact step along the
+    constant, to which all directions are then kept conjugate: where few points are held, a uniform
+    displacement is far softer than any wave. `grid` has the points of the level, and `levels` are
+    the fields of this level and the coarser ones.
     """
 
-    def __init__(self, contact: Contact, grid: Grid, level: Level, fields: list[_CoarseLevel]):
-        self.grid, self.rows, self.levels = grid, level.rows, fields
+    def __init__(self, contact: Contact, grid: Grid, level: Level, levels: list[_CoarseLevel]):
+        self.grid, self.rows, self.levels = grid, level.rows, levels
         self.stiffness = contact.grid.cut(contact.stiffness, grid)
         self.stiffness *= contact.grid.size / grid.size / level.scale
-        laplacian = dict.fromkeys(("centre", "y", "x", "corner"), kernels.ZERO)
-        scale = level.operator.penalty_scale * _at_growth(LONG_WAVE_PENALTY, level.growth)
-        self.penalty_alone = level.operator._replace(
-            **laplacian, is_squared=False, penalty_scale=np.float32(scale)
-        )
+        penalty = np.float32(LONG_WAVE_PENALTY * level.growth * level.operator.penalty_scale)
+        without, zero = level.operator._replace(penalty_scale=penalty), kernels.ZERO
+        self.penalty_alone = without._replace(centre=zero, y=zero, x=zero, corner=zero)
         zeros = partial(level.rows.empty_with_halo, grid.points, dtype=np.float32)
-        self.direction, self.change = zeros(), zeros()
+        self.direction, self.change, self.change_of_constant = zeros(), zeros(), zeros()
 
-    @np.errstate(over="ignore", invalid="ignore")  # `pcg` sees whether a solve diverges
+    @np.errstate(over="ignore", invalid="ignore")  # then the result is zero
     def solve(self) -> None:
         """Compute `y` of the level from its `rhs`, which is overwritten by the residual."""
-        first = self.levels[0]
-        fields = first.y, first.rhs, self.direction, self.change
-        z, residual, direction, change = map(self.rows.interior, fields)
-        result, curvature = np.zeros_like(z), 0.0
+        first, total = self.levels[0], self.grid.total
+        fields = first.y, first.rhs, self.direction, self.change, self.change_of_constant
+        z, residual, direction, change, of_constant = map(self.rows.interior, fields)
+        direction[...] = 1.0
+        change[...] = 0.0  # K times a constant
+        self._subtract_penalty()
+        of_constant[...] = change
+        held = -total(float(change.sum()))
+        if not held > 0:  # the mean of the displacement is arbitrary
+            _v_cycle(self.levels)
+            return
+        shift = np.float32(total(float(residual.sum())) / held)
+        result, curvature = np.full_like(z, shift), 0.0
+        residual += shift * of_constant
+        self.rows.exchange_halo(first.rhs)
         for _ in range(LONG_WAVE_STEPS):
             _v_cycle(self.levels)
             if curvature > 0:
@@ -358,7 +369,9 @@ class _LongWaves:
                 direction += z
             else:
                 direction[...] = z
-            self._compute_change()
+            direction += np.float32(self.grid.dot(direction, of_constant) / held)
+            self._apply_stiffness()
+            self._subtract_penalty()
             curvature = -self.grid.dot(direction, change)
             if not curvature > 0:
                 break
@@ -369,12 +382,18 @@ class _LongWaves:
         z[...] = result
         self.rows.exchange_halo(first.y)
 
-    def _compute_change(self) -> None:
-        """`change` <- that of the residual by the direction, minus K and the penalty times it."""
+    def _apply_stiffness(self) -> None:
+        """`change` <- minus K times the direction."""
         values = self.grid.padded[:, : self.grid.points]
         values[...] = self.rows.interior(self.direction)
         self.grid.filter_padded(self.stiffness)
         np.negative(values, out=self.rows.interior(self.change))
+
+    def _subtract_penalty(self) -> None:
+        """Subtract the penalty times the direction from `change`, which is the rhs of the kernel.
+
+        The kernel reads a row of the rhs only to write the same row of the result.
+        """
         self.rows.exchange_halo(self.direction)
         penalty = self.penalty_alone, self.levels[0].penalty
         fields = self.change, *penalty, self.direction, False, self.change

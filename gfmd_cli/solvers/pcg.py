@@ -61,12 +61,12 @@ most at n = 4, with 0.1: 0.99 to 1.05 times, with 0.5: 0.96 to 1.07 times (n = 2
 and the same with `--p-star 0.0003 0.003`. Up to MAX_SOFT_GROWTH the restarts suffice."""
 MIN_SELECTION_INTERVAL = 4  # smallest number of steps between two selections of the preconditioner
 MAX_SCREENING_CHANGE = 1.25  # factor in k(q_c) up to which the old value is kept
-"""With 1 the transforms are 0.99 to 1.06 times as many (n = 0.25 to 0.7, 64^2 to 256^2, seeds 3 to
-5): `scripts/solver_constants.py pcg.MAX_SCREENING_CHANGE 1 --exponents 0.25 0.5 0.7`."""
+"""With 1 the transforms are 0.99 to 1.05 times as many (n = 0.25 to 0.4, 64^2 to 256^2, seeds 3 to
+5): `scripts/solver_constants.py pcg.MAX_SCREENING_CHANGE 1 --exponents 0.25 0.35 0.4`."""
 SELECTION_GROWTH = 1.5  # growth of the number of steps from one selection to the next
-"""With one selection per grid the transforms are 0.89 to 1.04 times as many, in the mean 0.98 (n
+"""With one selection per grid the transforms are 0.89 to 1.03 times as many, in the mean 0.97 (n
 and grids as above, seeds 3 to 5): `scripts/solver_constants.py pcg.SELECTION_GROWTH 1e9 --exponents
-0.25 0.5 0.7`. Larger n select the V-cycle once and for all."""
+0.25 0.35 0.4`. Larger n select the V-cycle once and for all."""
 
 
 @dataclass(kw_only=True)

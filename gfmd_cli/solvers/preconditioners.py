@@ -31,7 +31,7 @@ n = 4 the Green's function takes up to 1200 steps at 2048 points, and thousands 
 
 
 class Preconditioner(Protocol):
-    """A symmetric positive approximation of the inverse of K on the free points."""
+    """A positive, nearly symmetric approximation of the inverse of K on the free points."""
 
     z: Field
     """The preconditioned force, which `apply` writes; rows as of `Grid.padded`."""

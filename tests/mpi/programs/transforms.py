@@ -192,7 +192,7 @@ for tiling in ((64, 1, 0), (33, 1, 1), (50, 2, 0), (40, 1, 2), (32, 3, 2)):
 for size, exponent in ((64, 1), (96, 2), (128, 3), (160, 4), (88, 2)):
     check_v_cycle(size, exponent)
 multigrid.MIN_LONG_WAVE_POINTS = 8
-for size in (64, 128, 256):  # the level of long waves is shared, or held by every process
+for size in (64, 128, 512):  # every process holds the level of long waves, or a part of it
     check_v_cycle(size, 1, has_long_waves=True)
 check_against_mpi4py_fft(64)
 sys.exit(0)
