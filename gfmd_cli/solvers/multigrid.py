@@ -87,9 +87,9 @@ COARSEST_STEP_PAIRS = 4  # of smoothing steps on the coarsest level
 """With 1, 2 and 8, 4 % fewer to 5 % more:
 `multigrid.COARSEST_STEP_PAIRS 1 2 8 --exponents 1 2 3 4`."""
 LONG_WAVE_FRACTION = 0.02  # of the points: an eighth a side
-"""With 0.07 the transforms are 1.05 to 1.07 times as many, with 0.005: 1.20 to 1.24. The options for this and
-the next constants are `multigrid.LONG_WAVE_FRACTION 0.07 0.005 --points 1024 --exponents 0.5 1
---p-star 0.0001 0.003 0.03 0.1 0.5`."""
+"""With 0.07 the transforms are 1.05 to 1.07 times as many, with 0.005: 1.20 to 1.24 times. The
+options for this and the next constants are `multigrid.LONG_WAVE_FRACTION 0.07 0.005 --points 1024
+--exponents 0.5 1 --p-star 0.0001 0.003 0.03 0.1 0.5`."""
 LONG_WAVE_STEPS = 2
 """With 1 the transforms are 1.00 to 1.05 times as many, with 3: 1.00 to 1.01 times."""
 MIN_LONG_WAVE_POINTS = 128  # along the shorter side of the level; with fewer no time is saved
