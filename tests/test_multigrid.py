@@ -234,10 +234,10 @@ def test_few_points_of_contact_take_fewer_steps(n, monkeypatch):
 
 def test_where_long_waves_are_solved_apart():
     """On large grids, where k(q) grows slowly; the level has an eighth of the points a side."""
-    for n, points, expected in ((1, 1024, 128), (0.5, 1024, 128), (1, 1020, 128), (1, 1600, 200)):
+    for n, points, expected in ((1, 1024, 128), (0.5, 1024, 128), (1, 1000, 125), (1, 1600, 200)):
         cycle = Multigrid(contact(n, points), Grid(points))
         assert cycle.solve_rest.__self__.grid.points == expected
-    for n, points in ((1, 512), (1, 1000), (1.25, 1024)):
+    for n, points in ((1, 512), (1, 750), (1.25, 1024)):
         cycle = Multigrid(contact(n, points), Grid(points))
         assert len(cycle.finer) == 1
 

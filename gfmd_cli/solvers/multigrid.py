@@ -92,7 +92,7 @@ options for this and the next constants are `multigrid.LONG_WAVE_FRACTION 0.07 0
 --exponents 0.5 1 --p-star 0.0001 0.003 0.03 0.1 0.5`."""
 LONG_WAVE_STEPS = 2
 """With 1 the transforms are 1.00 to 1.05 times as many, with 3: 1.00 to 1.01 times."""
-MIN_LONG_WAVE_POINTS = 128  # along the shorter side of the level; with fewer no time is saved
+MIN_LONG_WAVE_POINTS = 96  # along the shorter side of the level; with fewer no time is saved
 MAX_LONG_WAVE_GROWTH = 2.2  # of k(q) per octave; n = 1.1
 """Without the steps (0) the transforms are 1.20 to 1.24 times as many. With them for all k(q) (20),
 0.96 to 1.02 times at n = 1.25 to 2 (`--exponents 1.25 1.5 2 --p-star 0.03 0.1 0.5`), in steps that
@@ -344,7 +344,7 @@ class _LongWaves:
         zeros = partial(level.rows.empty_with_halo, grid.points, dtype=np.float32)
         self.direction, self.change, self.change_of_constant = zeros(), zeros(), zeros()
 
-    @np.errstate(over="ignore", invalid="ignore")  # then the result is zero
+    @np.errstate(over="ignore", invalid="ignore")  # no warnings, as in kernels
     def solve(self) -> None:
         """Compute `y` of the level from its `rhs`, which is overwritten by the residual."""
         first, total = self.levels[0], self.grid.total
