@@ -67,8 +67,8 @@ def compare(contact: Contact, tolerance: float, repeats: int) -> list[float]:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--points", type=int, nargs="+", default=[1024, 2048])
-    parser.add_argument("--exponents", type=float, nargs="+", default=[0.5, 1, 1.5])
-    parser.add_argument("--p-star", type=float, nargs="+", default=[0.03, 0.1, 0.5])
+    parser.add_argument("--exponents", type=float, nargs="+", default=[0.5, 1])
+    parser.add_argument("--p-star", type=float, nargs="+", default=[0.003, 0.03, 0.1, 0.5])
     parser.add_argument("--seeds", type=int, nargs="+", default=[20, 21])
     parser.add_argument("--tolerance", type=float, default=1e-4)
     parser.add_argument("--repeats", type=int, default=3)

@@ -92,7 +92,7 @@ options for this and the next constants are `multigrid.LONG_WAVE_FRACTION 0.07 0
 --exponents 0.5 1 --p-star 0.0001 0.003 0.03 0.1 0.5`."""
 LONG_WAVE_STEPS = 2
 """With 1 the transforms are 1.00 to 1.05 times as many, with 3: 1.00 to 1.01 times."""
-MIN_LONG_WAVE_POINTS = 96  # along the shorter side of the level; with fewer no time is saved
+MIN_LONG_WAVE_POINTS = 96  # along the shorter side of the level; a choice
 MAX_LONG_WAVE_GROWTH = 2.2  # of k(q) per octave; n = 1.1
 """Without the steps (0) the transforms are 1.20 to 1.24 times as many. With them for all k(q) (20),
 0.96 to 1.02 times at n = 1.25 to 2 (`--exponents 1.25 1.5 2 --p-star 0.03 0.1 0.5`), in steps that
@@ -228,15 +228,16 @@ def _is_half(coarse: Shape, fine: Shape) -> bool:
 
 def _level_of_long_waves(contact: Contact, levels: list[Level]) -> tuple[int, Grid] | None:
     """Number and grid of the level on which `_LongWaves` solves; None where this does not pay."""
-    grid = contact.grid
-    small = [i for i, t in enumerate(levels) if prod(t.shape) <= LONG_WAVE_FRACTION * grid.size]
+    most = LONG_WAVE_FRACTION * contact.grid.size
+    small = [number for number, level in enumerate(levels) if prod(level.shape) <= most]
     if not small or max(level.growth for level in levels) > MAX_LONG_WAVE_GROWTH:
         return None
     level = levels[small[0]]
-    grid = replace(grid.coarser(level.shape), precision="single", is_temporary=True)
-    has_same_rows = grid.rows.is_whole == level.rows.is_whole
+    grid = replace(contact.grid.coarser(level.shape), precision="single", is_temporary=True)
     is_large = min(level.shape) >= MIN_LONG_WAVE_POINTS
-    return (small[0], grid) if is_large and has_same_rows else None
+    if not is_large or grid.rows.is_whole != level.rows.is_whole:
+        return None
+    return small[0], grid
 
 
 class _CoarseLevel:
@@ -339,8 +340,10 @@ class _LongWaves:
         self.stiffness = contact.grid.cut(contact.stiffness, grid)
         self.stiffness *= contact.grid.size / grid.size / level.scale
         penalty = np.float32(LONG_WAVE_PENALTY * level.growth * level.operator.penalty_scale)
-        without, zero = level.operator._replace(penalty_scale=penalty), kernels.ZERO
-        self.penalty_alone = without._replace(centre=zero, y=zero, x=zero, corner=zero)
+        zero = kernels.ZERO
+        self.penalty_alone = level.operator._replace(
+            centre=zero, y=zero, x=zero, corner=zero, penalty_scale=penalty
+        )
         zeros = partial(level.rows.empty_with_halo, grid.points, dtype=np.float32)
         self.direction, self.change, self.change_of_constant = zeros(), zeros(), zeros()
 
@@ -413,8 +416,8 @@ class Multigrid:
         self.finer = self.coarse[:1]
         self.solve_rest: Callable[[], None] = partial(_v_cycle, self.coarse)
         self.transforms = 0.0
-        if (found := _level_of_long_waves(contact, levels)) is not None:
-            number, level_grid = found
+        if (long_waves := _level_of_long_waves(contact, levels)) is not None:
+            number, level_grid = long_waves
             self.finer, rest = self.coarse[:number], self.coarse[number - 1 :]
             self.solve_rest = _LongWaves(contact, level_grid, levels[number], rest).solve
             pairs = LONG_WAVE_STEPS * level_grid.size / contact.grid.size
