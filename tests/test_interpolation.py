@@ -5,7 +5,9 @@ import pytest
 
 from gfmd_cli import solve
 from gfmd_cli.maps.interpolation import _jumps, _short_waves, _ties, monotone, suited_interpolation
+from gfmd_cli.physics.elastomers import HalfSpace
 from gfmd_cli.physics.file_surface import FileSurface
+from gfmd_cli.physics.scenes import build_scene
 from gfmd_cli.physics.self_affine import SelfAffine
 
 POINTS = 64
@@ -183,3 +185,14 @@ def test_the_choice_is_named_and_can_be_overridden(tmp_path):
     assert forced.band_limited
     assert forced.heights(256).max() > 0.26
     np.testing.assert_array_equal(surface.heights(POINTS), forced.heights(POINTS))
+
+
+def test_a_scene_on_the_points_of_the_map_needs_no_interpolation(tmp_path, monkeypatch):
+    """Whether a map is band-limited takes a transform, and does not matter on its own points."""
+    path = tmp_path / "h.npy"
+    np.save(path, rough(4))
+    surface = FileSurface(path=path)
+    of_all_waves = build_scene(surface, HalfSpace(), 2 * POINTS).delta_sigma
+    monkeypatch.setattr(FileSurface, "applied_interpolation", lambda self: pytest.fail("asked"))
+    scene = build_scene(surface, HalfSpace(), POINTS)
+    assert scene.delta_sigma == pytest.approx(of_all_waves, rel=1e-12)

@@ -51,10 +51,12 @@ def _shape_with_all_waves(surface: RigidSurface, grid: Grid) -> Shape:
 
     That of the grid itself where the shortest wave is not known, or processes share the grid.
     """
-    if not (surface.band_limited and grid.whole):
+    if not grid.whole:
         return grid.whole_shape
     least = (surface.smallest_grid_y(), surface.smallest_grid())[-grid.dimension :]
-    return tuple(starmap(_coarsest, zip(grid.whole_shape, least, strict=True)))
+    shape = tuple(starmap(_coarsest, zip(grid.whole_shape, least, strict=True)))
+    # `band_limited` of a map may need a transform: asked only where the answer matters
+    return shape if shape == grid.whole_shape or surface.band_limited else grid.whole_shape
 
 
 def _coarsest(points: int, least: int) -> int:

@@ -56,8 +56,10 @@ def start_from(
         return None
     solve_on_tiles = LOCAL_SOLVES[last.boundary]
     for contact in finer:
-        tiles = _tiles_in_reach(pressure > 0, is_periodic=contact.is_periodic)
-        fraction = solve_on_tiles.max_fraction(contact.exponents[1])
+        touching, fraction = pressure > 0, solve_on_tiles.max_fraction(contact.exponents[1])
+        if np.count_nonzero(touching) > fraction * touching.size:
+            return None  # known before the tiles are, which take longer
+        tiles = _tiles_in_reach(touching, is_periodic=contact.is_periodic)
         if tiles.count > fraction * tiles.used.size:
             return None
         s = _refined(pressure, tiles)

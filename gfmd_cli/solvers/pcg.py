@@ -147,14 +147,13 @@ class ProjectedCG(Solver):
             return
         run = _Run(contact, state)
         while True:
-            if state.exact:
-                run.assess(run.classify())
-                state.rounding = 0.0
             run.select()  # [1]
             beta = run.precondition()  # [2]
             run.advance(beta)  # [3] to [5]
             state.step += 1
             yield state
+            if state.exact:
+                run.classify()
 
 
 def _new_state(contact: Contact, u: Field, sigma: Field) -> PCGState:
@@ -183,9 +182,13 @@ class _Run:
         self.preconditioner: Preconditioner | None = None
         self.classify()
 
-    def classify(self) -> Field:
-        """Compute the contact state; return the sums for `assess`."""
-        return self.rows.sums(3, kernels.classify, self.h, self.u, self.sigma, self.own_state)
+    def classify(self) -> None:
+        """Compute the contact state, and all that `assess` stores if sigma was computed from u."""
+        fields = (self.h, self.u, self.sigma)
+        sums = self.rows.sums(3, kernels.classify, *fields, self.own_state)
+        if self.state.exact:
+            self.assess(sums)
+            self.state.rounding = 0.0
 
     def assess(self, sums: Field) -> None:
         """Store the residual and the sums of squares of the free force and of the tension."""
