@@ -18,6 +18,8 @@ from gfmd_cli.physics.free_contact import build_free_scene
 from gfmd_cli.physics.scenes import build_scene
 from gfmd_cli.physics.self_affine import SelfAffine
 from gfmd_cli.physics.surface_spectrum import map_spectrum
+from gfmd_cli.solvers import nested_grids
+from gfmd_cli.solvers.auto import Auto
 
 ROUNDING = 1e-14  # a few units in the last place, times log2 of the size, for fields of order one
 GRIDS = [
@@ -332,8 +334,9 @@ def test_threads_change_nothing(shape, precision):
         np.testing.assert_allclose(backward(other, modes), field, atol=50 * eps, rtol=0)
 
 
-def test_a_surface_is_drawn_and_reduced_on_one_grid(monkeypatch):
-    """Each grid takes time for its plans and its memory."""
+@pytest.fixture
+def sizes(monkeypatch):
+    """Sizes of the transforms that are planned; 0 for plans that are not measured."""
     make, sizes = shared_transforms.planned_transforms, []
 
     def note(plan, size):
@@ -341,8 +344,23 @@ def test_a_surface_is_drawn_and_reduced_on_one_grid(monkeypatch):
         return make(plan, size)
 
     monkeypatch.setattr(shared_transforms, "planned_transforms", note)
+    return sizes
+
+
+def test_a_surface_is_drawn_and_reduced_on_one_grid(sizes):
+    """Each grid takes time for its plans and its memory."""
     build_scene(SelfAffine(cutoff=0.1), Power(n=1), 32)
     assert sizes == [32**2]
+
+
+@pytest.mark.parametrize("build", [build_scene, build_free_scene])
+def test_only_the_plans_of_the_finest_grid_are_measured(sizes, monkeypatch, build):
+    """The coarser ones make few transforms, in little time."""
+    monkeypatch.setattr(nested_grids, "COARSEST_POINTS", 8)
+    contact = build(SelfAffine(cutoff=0.1), Power(n=1), 32).contact(0.1)
+    nested_grids.solve_contact(contact, Auto(tolerance=1e-6))
+    assert 0 in sizes
+    assert min(set(sizes) - {0}) >= 32**2
 
 
 @pytest.fixture
@@ -400,7 +418,7 @@ def test_a_free_scene_measures_no_plans(planning, tmp_path, points, grid_points)
     build_free_scene(surface, Power(n=1), grid_points)
     assert map_spectrum(surface.mirrored()) is not None
     assert planning() == {"FFTW_ESTIMATE"}
-    build_scene(SelfAffine(cutoff=0.2), Power(n=1), points)
+    build_scene(SelfAffine(cutoff=0.1), Power(n=1), points)
     assert planning() == {"FFTW_MEASURE"}
 
 

@@ -42,6 +42,8 @@ class PaddedTransform:
     threads: int = 1
     transposition: Transposition | None = None
     """The exchange between the processes that share the fields; None for one process."""
+    is_temporary: bool = False
+    """As of `Grid`."""
 
     def __post_init__(self) -> None:
         self.field_rows, self.field_columns = (1, *self.shape)[-2:]
@@ -121,6 +123,11 @@ class PaddedTransform:
     @cached_property
     def _transforms(self) -> FieldTransforms:
         """The transforms of the padded fields."""
-        rows, exchange = self.local_rows, self.transposition
-        size = self.padded_columns, rows, exchange
-        return FieldTransforms(self._memory, *size, padded_rows=self.padded_rows)
+        return FieldTransforms(
+            self._memory,
+            self.padded_columns,
+            self.local_rows,
+            self.transposition,
+            padded_rows=self.padded_rows,
+            is_measured=not self.is_temporary,
+        )

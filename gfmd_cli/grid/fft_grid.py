@@ -328,8 +328,8 @@ class Grid:
         return field if self.dimension == 2 else field.reshape(1, -1)
 
     def coarser(self, shape: Shape) -> "Grid":
-        """A grid of fewer points on the same cell."""
-        return replace(self, points=shape[-1], points_y=shape[0])
+        """A temporary grid of fewer points on the same cell."""
+        return replace(self, points=shape[-1], points_y=shape[0], is_temporary=True)
 
     def doubled(self) -> "Grid":
         """A temporary grid of twice the points along each axis, on a cell of twice the sides."""
@@ -370,7 +370,13 @@ class Grid:
         """Transforms of fields that are padded by zeros to twice the points a side."""
         shape, padded = self.whole_shape, padded_shape(self.whole_shape)
         transposition = self._transposition(padded[-1] // 2 + 1)
-        return PaddedTransform(shape, padded, threads=self._threads, transposition=transposition)
+        return PaddedTransform(
+            shape,
+            padded,
+            threads=self._threads,
+            transposition=transposition,
+            is_temporary=self.is_temporary,
+        )
 
     def collect(self, field: Field) -> Field | None:
         """All of a field, on the first process; None on the others."""

@@ -233,7 +233,7 @@ def _level_of_long_waves(contact: Contact, levels: list[Level]) -> tuple[int, Gr
     if not small or max(level.growth for level in levels) > MAX_LONG_WAVE_GROWTH:
         return None
     level = levels[small[0]]
-    grid = replace(contact.grid.coarser(level.shape), precision="single", is_temporary=True)
+    grid = replace(contact.grid.coarser(level.shape), precision="single")
     is_large = min(level.shape) >= MIN_LONG_WAVE_POINTS
     if not is_large or grid.rows.is_whole != level.rows.is_whole:
         return None
