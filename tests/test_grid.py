@@ -408,6 +408,22 @@ def test_blocks_of_rows_are_planned_like_the_grid_when_they_are_needed(planning)
         assert planning() == {effort}
 
 
+@pytest.mark.parametrize(("rows", "sizes"), [(48, {16}), (40, {8}), (46, {46}), (16, {16})])
+def test_rows_are_transformed_in_equal_blocks(monkeypatch, rows, sizes):
+    """Of at most 23 rows here, so that they are of 8 or 16, or of all rows."""
+    monkeypatch.setattr(shared_transforms, "PLANNED_COEFFICIENTS", 23 * 7)
+    blocks = shared_transforms._equal_blocks(100, 100 + rows, 7)
+    assert {block.stop - block.start for block in blocks} == sizes
+    assert [i for block in blocks for i in range(block.start, block.stop)] == [
+        *range(100, 100 + rows)
+    ]
+    grid = Grid(12, points_y=rows)
+    field = noise(grid)
+    expected = np.fft.rfft2(field) / grid.size
+    np.testing.assert_allclose(forward(grid, field), expected, atol=ROUNDING, rtol=0)
+    np.testing.assert_allclose(backward(grid, expected), field, atol=ROUNDING, rtol=0)
+
+
 @pytest.mark.parametrize(("points", "grid_points"), [(30, 30), (30, 60)])
 def test_a_free_scene_measures_no_plans(planning, tmp_path, points, grid_points):
     """It makes one transform of each of its grids."""

@@ -28,6 +28,10 @@ from gfmd_cli.grid.transposition import Transposition
 BLOCK_COEFFICIENTS = 2**17  # in a block of columns; 2^16 to 2^18 take as long
 MIN_BLOCK_COLUMNS = 32  # shorter pieces of rows take longer to copy
 MIN_COPIED_BYTES = 24 * 2**20  # columns are copied where a thread has more coefficients; measured
+PLANNED_COEFFICIENTS = 2**19
+"""In a block of rows, whose transforms are planned with those of one block. Planning the rows of
+4096^2 then takes 2 s instead of 5 s, and the transforms take as long; with 2^17, up to 5 % longer
+(`scripts/row_blocks.py`)."""
 BLOCK_ROWS = 8  # rows per call where rows of zeros are skipped; each block begins aligned
 CACHE_LINE = 8  # complex numbers in single precision in a line of the cache
 
@@ -48,9 +52,14 @@ class RowTransforms:
         self, values: Field, lines: Modes, rows: LocalRows, fftw: Planner, size: int
     ) -> None:
         self.values, self.lines, self.pool, self.size = values, lines, rows.pool, size
-        arrays = [(values[a:b], lines[a:b]) for a, b in rows.parts]
-        self._forward = [fftw(v, c, (1,), "FFTW_FORWARD").execute for v, c in arrays]
-        self._backward = [fftw(c, v, (1,), "FFTW_BACKWARD").execute for v, c in arrays]
+        shares = [_equal_blocks(*part, lines.shape[1]) for part in rows.parts]
+
+        def plan(source: Any, target: Any, way: str) -> list[Execute]:
+            plans = ([fftw(source[r], target[r], (1,), way).execute for r in s] for s in shares)
+            return [partial(side_by_side, None, blocks) for blocks in plans]
+
+        self._forward = plan(values, lines, "FFTW_FORWARD")
+        self._backward = plan(lines, values, "FFTW_BACKWARD")
         self._count = len(rows.parts) if len(lines) % BLOCK_ROWS == 0 else 0
 
     def forward(self, blocks: Sequence[int] | None = None) -> None:
@@ -82,6 +91,19 @@ class RowTransforms:
             rows = slice(BLOCK_ROWS * block, BLOCK_ROWS * (block + 1))
             plan.update_arrays(self.values[rows], self.lines[rows])
             plan.execute()
+
+
+def _equal_blocks(first: int, last: int, columns: int) -> list[slice]:
+    """Blocks of as many rows each, so that the plan of one serves for all; each begins aligned.
+
+    All rows are one block where their number is not a multiple of `BLOCK_ROWS`.
+    """
+    count = last - first
+    most = min(PLANNED_COEFFICIENTS // columns, count)
+    size = max(
+        (n for n in range(BLOCK_ROWS, most + 1, BLOCK_ROWS) if count % n == 0), default=count
+    )
+    return [slice(a, a + size) for a in range(first, last, size)]
 
 
 @dataclass
