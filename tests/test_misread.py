@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
+import scipy.ndimage
 
-from gfmd_cli.maps.misread import filled_lines, misread
+from gfmd_cli.maps.misread import filled_lines, interpolated, misread
 from gfmd_cli.maps.topography import read_topography
 from gfmd_cli.physics.file_surface import FileSurface
 from gfmd_cli.physics.self_affine import SelfAffine
@@ -21,7 +22,8 @@ def _scan(hurst, points=POINTS, cutoff=4, seed=3):
 
 def _found(path, heights):
     np.save(path / "h.npy", heights)
-    return misread(read_topography(path / "h.npy"))
+    topography = read_topography(path / "h.npy")
+    return misread(topography) or interpolated(topography)
 
 
 def _counts(heights, levels):
@@ -117,6 +119,28 @@ def test_a_structured_surface_gives_none(tmp_path, shape, noise):
     for sound in (heights, heights.T, _counts(heights, 255)):
         assert not _found(tmp_path, sound)
         assert not filled_lines(read_topography(tmp_path / "h.npy"))[0]
+
+
+@pytest.mark.parametrize("hurst", [0.5, 0.9])
+@pytest.mark.parametrize("from_centres", [False, True])
+@pytest.mark.parametrize("order", [1, 3])
+@pytest.mark.parametrize(("factor", "period"), [(1.5, 3), (2, 2), (3, 3)])
+def test_an_interpolated_map_gives_one_warning(
+    tmp_path, factor, period, order, from_centres, hurst
+):
+    measured = _scan(hurst, cutoff=2)
+    options = {"order": order, "mode": "nearest", "grid_mode": from_centres}
+    heights = scipy.ndimage.zoom(measured, factor, **options)
+    words = f"a period of {period} points along x and {period} along y"
+    assert words in _found(tmp_path, heights)
+    surface = FileSurface(path=tmp_path / "h.npy", length=1e-5, periodic=False)
+    found = [each for each in surface.warnings() if "gradient" not in each]
+    assert len(found) == 1
+    assert words in found[0]
+    heights[30:40, 50:90] = np.nan
+    assert words in _found(tmp_path, heights)
+    for sound in (measured, scipy.ndimage.gaussian_filter(measured, 1.0)):
+        assert not _found(tmp_path, sound)
 
 
 def test_spikes_are_not_wrapped_around(tmp_path):

@@ -1,4 +1,4 @@
-"""Signs of a map whose numbers were read or saved wrongly: type, byte order, order of the lines.
+"""Signs of a map that was read or saved wrongly: type, byte order, order of lines, more points.
 
 Each public function returns a warning, or "" if what its docstring describes does not occur;
 `filled_lines` also returns the map. The limits lie between the values of sound and of damaged maps
@@ -6,6 +6,7 @@ Each public function returns a warning, or "" if what its docstring describes do
 """
 
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 
@@ -36,6 +37,10 @@ MIN_JUMPS_ACROSS = 0.02  # jumps along one axis over those along the other: saw 
 ROUNDING = 1e-6  # spread at both ends over the range, below which a map has two levels; a choice
 MAX_SINGLE = 0.95  # fraction of the jumps along x to and from single points; spikes have 1
 MAX_WRAP_GAP = 2.3  # median distance of a jump from the whole range over the spread at both ends
+MIN_INTERPOLATED_POINTS = 64  # per side: fewer have such a period by chance
+PERIODS = (2, 3)  # points of an interpolated map, from one kind of point to the next; a choice
+PART = 32  # points, in which positions keep their place in the period; a choice
+MIN_EXTREMA = 0.75  # fraction of one position of the period, at which differences are extreme
 
 
 def filled_lines(topography: Topography) -> tuple[str, Topography]:
@@ -98,6 +103,41 @@ def misread(topography: Topography) -> str:
         warning = warning or _disordered(lines, along) or _displaced(lines, along)
         warning = warning or _sheared(lines, along)
     return warning
+
+
+def interpolated(topography: Topography) -> str:
+    """Heights that were interpolated between fewer points, along x and along y.
+
+    Interpolated heights vary more, or less, near the points between which they lie than half-way.
+    Those of a surface vary equally everywhere, also those of a smooth or a blurred one.
+    """
+    heights = topography.with_gaps()
+    if heights.ndim == 1 or min(heights.shape) < MIN_INTERPOLATED_POINTS:
+        return ""
+    along_x, along_y = _period(heights), _period(heights.T)
+    if not (along_x and along_y):
+        return ""
+    return (
+        f"the curvature of the heights has a period of {along_x} points along x and {along_y} "
+        "along y: was the map interpolated to more points than were measured? Then it lacks short "
+        "waves, so that the contact area at light load is too large: use the measured points"
+    )
+
+
+def _period(lines: Field) -> int:
+    """The period of the second or third differences along lines, 0 without one."""
+    some = lines[_sample(len(lines))]
+    for order, period in product((2, 3), PERIODS):  # the second do not show halved distances
+        differences = np.abs(np.diff(some, order, axis=1))
+        number = np.isfinite(differences).sum(axis=0)
+        mean = np.nansum(differences, axis=0) / np.maximum(number, 1)
+        for one in (mean, -mean):
+            is_peak = (one[1:-1] > one[:-2]) & (one[1:-1] > one[2:])
+            positions = is_peak[: is_peak.size // period * period].reshape(-1, period)
+            parts = np.array_split(positions, len(mean) // PART)
+            if np.mean([part.mean(axis=0).max() for part in parts]) > MIN_EXTREMA:
+                return period
+    return 0
 
 
 def _mean(differences: Field) -> float:

@@ -572,6 +572,7 @@ def _warnings_on_heights(surface: FileSurface) -> tuple[str, ...]:
         lines,
         "" if is_explained else unresolved_noise or noisy(sound, spacing, scale, cutoff),
         "" if misread_map else tip,
+        misread.interpolated(sound),
         map_warnings.curved(levelled),
         map_warnings.steep(surface.levelling(), subtracted, sides),
         map_warnings.repeated_lines(topography.heights),
