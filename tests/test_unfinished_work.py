@@ -216,5 +216,5 @@ def test_a_study_keeps_its_mode_and_the_link_to_it(gfmd):
 
 def test_a_checkpoint_that_another_process_deletes_is_not_a_foreign_file(tmp_path, monkeypatch):
     """It is in the list of the folder, but no longer there."""
-    monkeypatch.setattr(unfinished_work, "_listed", lambda folder: [folder / ("0" * 16)])
+    monkeypatch.setattr(unfinished_work, "listed", lambda folder: [folder / ("0" * 16)])
     unfinished_work.check_own(tmp_path)
