@@ -164,7 +164,7 @@ class Study:
             except FileNotFoundError:  # it has just been collected
                 continue
             except StudyError as error:
-                if path.exists():  # likewise
+                if os.path.lexists(path):  # likewise
                     damaged[path] = error
         return entries, damaged
 

@@ -165,6 +165,6 @@ def read_failure(parts: Path, task_id: str) -> str:
 def set_aside(path: Path, bad: Path | None = None) -> Path:
     """Rename a damaged file to *.bad, which no earlier one has; return the new path."""
     bad = bad or path.with_suffix(".bad")
-    while bad.exists() or bad.is_symlink():
+    while os.path.lexists(bad):
         bad = bad.with_suffix(".again.bad")
     return path.replace(bad)
