@@ -216,6 +216,34 @@ def test_a_read_only_study_is_kept(gfmd):
     assert Path("a.h5").read_bytes() == before
 
 
+def test_a_file_that_cannot_be_looked_for_is_told_with_the_reason(gfmd):
+    """As in a folder without permission, which root can search."""
+    assert gfmd("run", "spec.toml", "-o", "a.h5").exit_code == 0
+    folder = "long" * 100
+    for words in (
+        ("run", "spec.toml", "-o", f"{folder}/x.h5"),
+        ("run", "spec.toml", "-o", f"{folder}/x.h5", "--dry-run"),
+        ("run", "spec.toml", "-o", f"{folder}/x.h5", "--overwrite"),
+        ("submit", "spec.toml", "-o", f"{folder}/x.h5", "--shards", "2", "--dry-run"),
+        ("status", "spec.toml", "-o", f"{folder}/x.h5"),
+        ("status", f"{folder}/x.h5"),
+        ("collect", "spec.toml", "-o", f"{folder}/x.h5"),
+        ("analyze", f"{folder}/x.h5"),
+        ("report", "a.h5", "--bench", f"{folder}/x.h5"),
+        ("export", f"{folder}/x.h5"),
+        ("diff", "a.h5", f"{folder}/x.h5"),
+        ("bench", "spec.toml", "-o", f"{folder}/x.h5"),
+        ("surface", f"{folder}/x.npy"),
+        ("init", "new.toml", "--from", f"{folder}/x.npy"),
+        ("init", f"{folder}/x.toml", "--from", "none.npy"),
+    ):
+        result = gfmd(*words)
+        assert result.exit_code in (2, 73, 74), words
+        expected = rf"gfmd: .*{folder}/.*\n"
+        assert re.fullmatch(expected, result.output), result.output
+        assert "File name too long" in result.output
+
+
 def test_a_file_that_cannot_be_written_is_told_with_the_reason(gfmd):
     assert gfmd("run", "spec.toml", "-o", "a.h5").exit_code == 0
     Path("file").write_text("")

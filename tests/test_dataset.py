@@ -7,7 +7,7 @@ import pytest
 import xarray
 
 from gfmd_cli import dataset
-from gfmd_cli.errors import InputError
+from gfmd_cli.errors import GfmdError, InputError
 from gfmd_cli.spec.parse import read_spec
 from gfmd_cli.study.reading import read_rows
 from gfmd_cli.study.run import RunOptions, run_study
@@ -144,6 +144,12 @@ def test_single_tasks_have_no_index_and_can_be_joined(data):
     assert parts[0].hurst == data.hurst[1]
     joined = xarray.concat(parts, "task", coords="different", compat="equals")
     assert data.a_r.values[[1, 0]].tolist() == joined.values.tolist()
+
+
+@pytest.mark.parametrize("name", ["x.nc", "x.h5"])
+def test_a_file_that_cannot_be_looked_for_is_not_taken_for_missing(tmp_path, name):
+    with pytest.raises(GfmdError, match=r"not a readable .*File name too long"):
+        dataset(tmp_path / ("long" * 100) / name)
 
 
 @pytest.mark.parametrize(("name", "what"), [("none.nc", "netCDF file"), ("none.h5", "study")])

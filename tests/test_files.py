@@ -6,7 +6,14 @@ from pathlib import Path
 import pytest
 
 from gfmd_cli.errors import GfmdError
-from gfmd_cli.files.atomic import NewFile, check_place, make_folder, target_of, write_whole
+from gfmd_cli.files.atomic import (
+    NewFile,
+    check_place,
+    exists,
+    make_folder,
+    target_of,
+    write_whole,
+)
 from gfmd_cli.files.cache import cache_folder
 from gfmd_cli.files.checksums import file_digest
 from gfmd_cli.files.regular import open_regular, read_regular
@@ -85,6 +92,16 @@ def test_after_an_error_what_was_not_written_is_read_as_zeros(tmp_path):
 def test_a_folder_that_cannot_be_searched_is_one_message(tmp_path, call):
     with pytest.raises(GfmdError, match=r"cannot be (written|read)"):
         call(tmp_path / ("long" * 100) / "file")
+
+
+def test_a_file_that_cannot_be_looked_for_is_not_taken_for_missing(tmp_path):
+    (tmp_path / "file").touch()
+    assert exists(tmp_path)
+    assert exists(tmp_path / "file")
+    for missing in ("none", "none/file", "file/none", "null\0"):
+        assert not exists(tmp_path / missing)
+    with pytest.raises(OSError, match="too long"):
+        exists(tmp_path / ("long" * 100))
 
 
 def test_a_file_may_lie_in_a_folder_that_cannot_be_read(tmp_path, monkeypatch):

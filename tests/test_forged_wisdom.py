@@ -45,6 +45,14 @@ def test_wisdom_as_fftw_writes_it_is_read(wisdom, tmp_path):
     assert plans._limited(wisdom) == wisdom
 
 
+def test_a_link_in_the_place_of_wisdom_is_damage(wisdom, tmp_path):
+    path = plans._path(tmp_path)
+    for target in ("nowhere", "long" * 100):
+        path.unlink()
+        path.symlink_to(target)
+        assert "damaged" in plans.plan_with(tmp_path)
+
+
 @pytest.mark.parametrize("place", [0, 1, 2])
 def test_flags_of_too_many_bits_which_abort_fftw_are_not_read(wisdom, tmp_path, place):
     numbers = ["#x11bdd", "#x11bdd", "#x0"]

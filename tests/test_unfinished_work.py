@@ -160,6 +160,12 @@ def test_a_slot_is_not_written_through_a_link(checkpoint):
     assert target.read_text() == "precious"
 
 
+def test_a_checkpoint_whose_folder_cannot_be_made_is_told_with_the_reason(tmp_path):
+    folder = tmp_path / ("long" * 100)
+    with pytest.raises(SpaceError, match="too long"), Checkpoint.exclusive(folder):
+        pass
+
+
 @pytest.mark.parametrize("kind", ["pipe", "directory", "sparse", "link", "device"])
 def test_a_record_of_another_kind_is_refused(tmp_path, kind):
     (tmp_path / "parts").mkdir()
@@ -192,6 +198,17 @@ def test_a_record_that_links_elsewhere_is_set_aside_and_solved_again(gfmd):
     assert list(path.parent.glob(f"*{SUFFIX}")) == []
 
 
+def test_a_link_to_nowhere_in_the_place_of_a_record_is_set_aside(gfmd):
+    unfinished(gfmd)
+    path = Path("s.parts") / f"{'0' * 16}.record"
+    path.symlink_to("nowhere")
+    done = gfmd("run", "spec.toml", "-o", "s.h5", "-j", "1")
+    assert done.exit_code == 0
+    assert done.output.count("set aside as") == 1
+    assert path.with_suffix(".bad").is_symlink()
+    assert not path.is_symlink()
+
+
 def test_a_folder_of_the_user_is_refused_and_kept(gfmd):
     Path("s.parts").mkdir()
     Path("s.parts/drawing.step").write_text("mine")
@@ -216,5 +233,5 @@ def test_a_study_keeps_its_mode_and_the_link_to_it(gfmd):
 
 def test_a_checkpoint_that_another_process_deletes_is_not_a_foreign_file(tmp_path, monkeypatch):
     """It is in the list of the folder, but no longer there."""
-    monkeypatch.setattr(unfinished_work, "_listed", lambda folder: [folder / ("0" * 16)])
+    monkeypatch.setattr(unfinished_work, "listed", lambda folder: [folder / ("0" * 16)])
     unfinished_work.check_own(tmp_path)

@@ -17,7 +17,7 @@ from gfmd_cli.analysis.compare import VARIANTS, Comparison
 from gfmd_cli.analysis.ensemble import ensembles
 from gfmd_cli.analysis.table import known, plain
 from gfmd_cli.errors import INSTALL, InputError
-from gfmd_cli.files.atomic import new_file, target_of
+from gfmd_cli.files.atomic import exists, new_file, target_of
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.physics.observables import MAIN_OBSERVABLES
 from gfmd_cli.study import columns as layout
@@ -105,9 +105,9 @@ def as_dataset(path: Path) -> Any:
     there is no such study, StudyError.
     """
     if path.suffix == ".nc":
-        if not path.exists():
-            raise InputError(f"{path}: no such netCDF file")
         try:
+            if not exists(path):
+                raise InputError(f"{path}: no such netCDF file")
             data = _xarray().open_dataset(path, engine="h5netcdf")
         except (OSError, ValueError) as error:
             raise InputError(f"{path}: not a readable netCDF file: {error}") from error

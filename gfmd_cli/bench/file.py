@@ -8,7 +8,7 @@ from typing import Any, Self
 import numpy as np
 
 from gfmd_cli.errors import InputError, StudyError
-from gfmd_cli.files.atomic import check_place, new_file, target_of
+from gfmd_cli.files.atomic import check_place, exists, new_file, target_of
 from gfmd_cli.files.hdf5 import find, new_hdf5, open_hdf5, read_dataset, write_scale
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.spec.differences import differences
@@ -76,7 +76,7 @@ class Trace:
 def check_target(path: Path, spec: Spec) -> None:
     """Refuse to replace anything but a bench file of this spec. Raises InputError, SpaceError."""
     check_place(target_of(path))
-    if not path.exists():
+    if not exists(path):
         return
     try:
         with open_hdf5(path) as file:
@@ -111,13 +111,14 @@ def read_bench(path: Path) -> list[Trace]:
 
     Raises InputError where there is none, StudyError where it is not a bench file or damaged.
     """
-    if not path.exists():
-        raise InputError(f"{path}: no such bench file")
-    with damage_named(path, "bench file"), open_hdf5(path) as file:
-        if file.attrs.get(BENCH_ATTRIBUTE) != BENCH_LAYOUT:
-            raise StudyError(f"{path}: not a bench file of layout {BENCH_LAYOUT}")
-        runs = find(file, "runs")
-        return [_read_trace(find(runs, str(number))) for number in range(len(runs))]
+    with damage_named(path, "bench file"):
+        if not exists(path):
+            raise InputError(f"{path}: no such bench file")
+        with open_hdf5(path) as file:
+            if file.attrs.get(BENCH_ATTRIBUTE) != BENCH_LAYOUT:
+                raise StudyError(f"{path}: not a bench file of layout {BENCH_LAYOUT}")
+            runs = find(file, "runs")
+            return [_read_trace(find(runs, str(number))) for number in range(len(runs))]
 
 
 def _read_trace(group: Any) -> Trace:

@@ -26,11 +26,11 @@ def init(spec: Path, scan: Path | None, overrides: tuple[str, ...]) -> None:
         gfmd init contact.toml --from nm.npy --set surface.scale=1e-9 --set surface.length=1e-5
         gfmd init steel.toml --from scan.di --set elastomer.E_star=70e9 --set "load.pressure=[1e8]"
     """
-    from gfmd_cli.files.atomic import target_of, write_whole
+    from gfmd_cli.files.atomic import exists, target_of, write_whole
     from gfmd_cli.spec.parse import read_scan
     from gfmd_cli.spec.starter import starter, starter_of_scan
 
-    if spec.exists():
+    if exists(spec):
         raise InputError(f"{spec}: the file exists; choose another name or remove it")
     if scan is None:
         text = starter(spec, overrides)

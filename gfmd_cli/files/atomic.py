@@ -79,6 +79,18 @@ def target_of(path: Path) -> Path:
     return Path(os.path.realpath(path)) if os.path.islink(path) else path
 
 
+def exists(path: Path) -> bool:
+    """Whether there is something at `path`. Raises OSError where that cannot be found out.
+
+    From Python 3.14 on, `Path.exists` answers False there.
+    """
+    try:
+        path.stat()
+    except (FileNotFoundError, NotADirectoryError, ValueError):  # ValueError: a null character
+        return False
+    return True
+
+
 def temporary_name(path: Path) -> str:
     """A name that no other file has, for a file that is being written or removed."""
     return f".{path.name}.{uuid4().hex}"
@@ -117,9 +129,7 @@ def _check_target(path: Path) -> None:
     A file that nobody may write is kept, although it could be replaced, and root could write it.
     Raises OSError where the folder cannot be searched.
     """
-    if not path.parent.is_dir():
-        with suppress(FileNotFoundError, NotADirectoryError):
-            path.parent.stat()  # raises other errors, which `is_dir` ignores from Python 3.14 on
+    if not (exists(path.parent) and path.parent.is_dir()):
         raise SpaceError(f"{path}: cannot be written: there is no folder {path.parent}")
     with suppress(FileNotFoundError):
         if not path.stat().st_mode & WRITABLE:

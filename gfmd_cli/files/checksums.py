@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from gfmd_cli.errors import InputError
-from gfmd_cli.files.atomic import NewFile
+from gfmd_cli.files.atomic import NewFile, exists
 
 Version = tuple[int, ...]
 """Numbers that tell a file from one that replaces it, see `file_version`."""
@@ -79,7 +79,7 @@ def file_version(path: Path, *, follow: bool = True) -> Version:
 def file_digest(path: Path) -> str:
     """SHA-256 of a file's content. Raises InputError where it cannot be read."""
     try:
-        if not path.is_file():
+        if not (exists(path) and path.is_file()):
             raise InputError(f"{path}: no such file, or not a regular one")
         with path.open("rb") as file:
             return hashlib.file_digest(file, "sha256").hexdigest()

@@ -125,7 +125,7 @@ def plan_with(
             return None
         with _planning_lock(folder):
             wisdom = read_wisdom(folder)
-            damaged = wisdom is None and _path(folder).exists()
+            damaged = wisdom is None and os.path.lexists(_path(folder))
             if wisdom is None and (known := read_wisdom(cache_folder())) is not None:
                 _write(folder, known)
     if not damaged:

@@ -14,6 +14,7 @@ from pydantic import Field as Key
 from pydantic import Strict, model_validator
 
 from gfmd_cli.errors import InputError
+from gfmd_cli.files.atomic import exists
 from gfmd_cli.grid.arrays import Field, Mask
 from gfmd_cli.maps.esri_grid import SIGNATURE, read_esri_grid
 from gfmd_cli.maps.height_map import (
@@ -166,7 +167,7 @@ def read_topography(
 
 def _reader(path: Path) -> Callable[[Path, str | None], HeightMap]:
     """The function that reads a file, by its suffix or its first bytes. Raises InputError."""
-    if not path.exists():
+    if not exists(path):
         raise InputError("no such file")
     if not path.is_file():
         kind = "a directory" if path.is_dir() else "not a regular file"

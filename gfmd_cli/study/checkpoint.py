@@ -65,7 +65,7 @@ class Checkpoint:
 
         Where no state was saved, nothing is left of the folder.
         """
-        if folder.is_symlink():
+        if os.path.islink(folder):
             raise StudyError(f"{folder}: a link in the place of a checkpoint; remove it")
         checkpoint, lock = cls(folder, ranks), locked(folder / "lock", wait=False)
         with ExitStack() as stack:

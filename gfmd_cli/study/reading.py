@@ -11,6 +11,7 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from gfmd_cli.errors import InputError, StudyError, typed
+from gfmd_cli.files.atomic import exists
 from gfmd_cli.files.hdf5 import find, has, open_hdf5, read_dataset, take
 from gfmd_cli.grid.arrays import Field
 from gfmd_cli.maps.pictures import Picture
@@ -243,11 +244,12 @@ def open_study(source: Path, opened: BinaryIO | None = None) -> Iterator[StudyFi
             f"{source}: a run spec, where a study (NAME.h5) is expected; "
             f"`gfmd run {typed(source)}` makes the study"
         )
-    if opened is None and not source.exists():
-        raise InputError(f"{source}: no such study")
-    with damage_named(source), open_hdf5(opened or source) as file:
-        _check_layout(source, file)
-        yield StudyFile(file)
+    with damage_named(source):
+        if opened is None and not exists(source):
+            raise InputError(f"{source}: no such study")
+        with open_hdf5(opened or source) as file:
+            _check_layout(source, file)
+            yield StudyFile(file)
 
 
 def _check_layout(path: Path, file: Any) -> None:

@@ -7,6 +7,7 @@ from math import nan
 from pathlib import Path
 
 from gfmd_cli.errors import GfmdError, InputError, Interrupted, SpaceError, StudyError
+from gfmd_cli.files.atomic import exists
 from gfmd_cli.files.checksums import Version, file_digest, file_version
 from gfmd_cli.grid.blas import one_blas_thread
 from gfmd_cli.grid.fft_grid import Shape
@@ -156,7 +157,7 @@ def solve_task(task: Task, parts: Path, context: SolveContext) -> Status:
     Raises Interrupted after the state was saved, and where `parts` was renamed or deleted, which
     ends the run; InputError, SpaceError.
     """
-    if not parts.is_dir():
+    if not (exists(parts) and parts.is_dir()):
         raise Interrupted(f"{parts}: renamed or deleted during the run")
     context.report(ProgressEvent(task.index, "start", task.label))
     _check_files(task)  # before the work for it begins

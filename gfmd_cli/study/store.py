@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from gfmd_cli.errors import InputError, Interrupted, SpaceError, StudyError
-from gfmd_cli.files.atomic import check_place, new_file, target_of
+from gfmd_cli.files.atomic import check_place, exists, new_file, target_of
 from gfmd_cli.files.checksums import Version, file_version
 from gfmd_cli.files.hdf5 import new_hdf5
 from gfmd_cli.files.locks import AS_LONG_AS_NEEDED, WaitOptions, locked
@@ -47,7 +47,7 @@ class Study:
     def __init__(self, path: Path, wait_options: WaitOptions = AS_LONG_AS_NEEDED) -> None:
         self._wait_options = wait_options
         self.path = target_of(path)
-        if self.path.is_symlink():
+        if os.path.islink(self.path):
             raise InputError(f"{path}: a symbolic link that leads to itself")
         if not self.path.name:
             raise InputError(f"{path}: a folder, where a study file (NAME.h5) is expected")
@@ -92,7 +92,7 @@ class Study:
         """What is stored of each task that is solved, collected or not, by its id."""
         records, _ = self.records()  # before the study, which may take them in meanwhile
         outcomes: dict[str, Outcome] = {}
-        if self.path.exists():
+        if exists(self.path):
             with open_study(self.path) as file:
                 tasks = zip(file.task_ids, file.statuses, file.stored, strict=True)
                 outcomes = {
@@ -115,7 +115,7 @@ class Study:
         with self._collecting():
             records, damaged = self._sound_records()
             with ExitStack() as stack:
-                old = stack.enter_context(open_study(self.path)) if self.path.exists() else None
+                old = stack.enter_context(open_study(self.path)) if exists(self.path) else None
                 attributes = origin(spec, text)
                 attributes[EARLIER] = json.dumps(_earlier_specs(old, text))
                 results = self._stored_results(records, old)
@@ -135,17 +135,17 @@ class Study:
         """
         check_place(self.path)
         number, target = 1, self.path
-        while target.exists() or Study(target).parts.exists():
+        while exists(target) or exists(Study(target).parts):
             target = self.path.with_name(f"{self.path.stem}.{number}{self.path.suffix}")
             number += 1
         new_paths = []
-        if self.parts.exists():
+        if exists(self.parts):
             unfinished_work.check_own(self.parts)
             with locked(self.parts / "in-use", wait=False) as alone:
                 if not alone:
                     raise InputError(f"{self.path}: another run works on this study; wait for it")
                 new_paths.append(_renamed(self.parts, Study(target).parts))
-        if self.path.exists():
+        if exists(self.path):
             new_paths.append(_renamed(self.path, target))
         return new_paths
 
@@ -164,7 +164,7 @@ class Study:
             except FileNotFoundError:  # it has just been collected
                 continue
             except StudyError as error:
-                if path.exists():  # likewise
+                if os.path.lexists(path):  # likewise
                     damaged[path] = error
         return entries, damaged
 
@@ -190,11 +190,15 @@ class Study:
 
     def damaged_paths(self) -> list[Path]:
         """The damaged files that were set aside."""
-        return sorted(self.parts.glob("*.bad"))
+        return self._parts_named(".bad")
 
     def record_paths(self) -> list[Path]:
         """The records that are not collected yet."""
-        return sorted(self.parts.glob(f"*{unfinished_work.SUFFIX}"))
+        return self._parts_named(unfinished_work.SUFFIX)
+
+    def _parts_named(self, suffix: str) -> list[Path]:
+        """The unfinished work with this suffix. Raises OSError where the folder cannot be read."""
+        return sorted(path for path in unfinished_work.listed(self.parts) if path.suffix == suffix)
 
     def _check_held(self) -> None:
         """Raise SpaceError where the folder of unfinished work is no longer that of `work`."""

@@ -38,7 +38,7 @@ def check_own(parts: Path) -> None:
     """Refuse a folder that is not gfmd's. Raises InputError, SpaceError where none can be made."""
     if parts.is_symlink() or parts.is_file():
         raise SpaceError(f"{parts}: not a folder; move it away or choose another name (-o)")
-    for path in _listed(parts):
+    for path in listed(parts):
         own = OWN_FOLDERS if _is_folder(path) else OWN_FILES
         is_own = own.fullmatch(path.name) or path.suffix == ".bad"  # a folder set aside
         if not is_own and os.path.lexists(path):  # another process may have deleted it
@@ -54,7 +54,7 @@ def remove_parts(parts: Path) -> None:
     The locks that this process holds are deleted last, `collecting` after `in-use`: a process that
     can take `collecting` can then take both, and delete what it made in the meantime.
     """
-    for path in _listed(parts):
+    for path in listed(parts):
         if _is_folder(path):
             if OWN_FOLDERS.fullmatch(path.name):
                 delete_checkpoint(path)
@@ -66,7 +66,7 @@ def remove_parts(parts: Path) -> None:
         parts.rmdir()
 
 
-def _listed(folder: Path) -> list[Path]:
+def listed(folder: Path) -> list[Path]:
     """What is in a folder; nothing where there is none: perhaps it has just been deleted."""
     try:
         return list(folder.iterdir())
@@ -76,12 +76,12 @@ def _listed(folder: Path) -> list[Path]:
 
 def _is_folder(path: Path) -> bool:
     """Whether a path is a folder, not a link to one."""
-    return path.is_dir() and not path.is_symlink()
+    return os.path.isdir(path) and not os.path.islink(path)
 
 
 def delete_checkpoint(folder: Path) -> None:
     """Delete the files of a checkpoint, its pointer first, then the folder if it is empty."""
-    for path in (folder / "pointer", *_listed(folder)):
+    for path in (folder / "pointer", *listed(folder)):
         if IN_CHECKPOINT.fullmatch(path.name):
             with suppress(OSError):
                 path.unlink()
@@ -97,7 +97,7 @@ def record_path(parts: Path, task_id: str, stored: Iterable[str]) -> Path:
 def checkpoint_ids(parts: Path) -> list[str]:
     """The ids of the tasks that have a checkpoint in the folder."""
     return [
-        path.name for path in _listed(parts) if path.is_dir() and OWN_FOLDERS.fullmatch(path.name)
+        path.name for path in listed(parts) if path.is_dir() and OWN_FOLDERS.fullmatch(path.name)
     ]
 
 
@@ -165,6 +165,6 @@ def read_failure(parts: Path, task_id: str) -> str:
 def set_aside(path: Path, bad: Path | None = None) -> Path:
     """Rename a damaged file to *.bad, which no earlier one has; return the new path."""
     bad = bad or path.with_suffix(".bad")
-    while bad.exists() or bad.is_symlink():
+    while os.path.lexists(bad):
         bad = bad.with_suffix(".again.bad")
     return path.replace(bad)

@@ -3,6 +3,7 @@
 import os
 import shutil
 import signal
+import stat
 from contextlib import suppress
 
 import pytest
@@ -153,3 +154,33 @@ def test_what_is_no_file_of_gfmd_is_refused_or_made_anew(study, start, gfmd, tmp
         else:
             assert len(output.splitlines()) < 2
         assert [row["status"] for row in read_rows(folder / "study.h5")] == ["converged"] * 2
+
+
+@pytest.mark.parametrize(
+    "words",
+    [RUN, (*RUN, "--dry-run"), (*RUN, "--overwrite"), ("status", RUN[1]), ("collect", RUN[1])],
+)
+def test_a_study_without_permission_is_not_begun_anew(study, start, tmp_path, words):
+    folder = study()
+    parts = folder / "study.parts"
+    shutil.copy(folder / "spec.toml", tmp_path)
+    before = {path: path.is_dir() or path.read_bytes() for path in folder.rglob("*")}
+    cases = [(folder, 0), (folder, 0o600), (parts, 0), (parts, 0o300), (parts, 0o600)]
+    for place, mode in cases:
+        usual = stat.S_IMODE(place.stat().st_mode)
+
+        def prepare(place=place, mode=mode):
+            place.chmod(mode)
+            if os.geteuid() == 0:
+                as_nobody(tmp_path)
+
+        child = start(tmp_path, (*words, "-o", "study/study.h5"), prepare)
+        status = child.wait()
+        place.chmod(usual)
+        assert status in REFUSED, (place, mode, child.said)
+        assert place.name in child.said
+        assert child.said.startswith("gfmd: ")
+        assert child.said.count("\n") == 1
+        assert "Permission denied" in child.said
+        after = {path: path.is_dir() or path.read_bytes() for path in folder.rglob("*")}
+        assert after == before
