@@ -24,6 +24,7 @@ SMALL = {
     "identities.py": "--points 32 --cutoff 0.1 --exponents 1",
     "indenter_bars.py": "--points 64 --line-reference 256 --round-reference 128 --exponents 1 "
     "--pressures 1",
+    "interpolated_maps.py": "--points 64 --seeds 1 --contacts",
     "line_bars.py": "--seeds 1 --exponents 1 --finest 512",
     "forecast_pairs.py": "--points 64 --exponents 1 --cutoff 0.1 --repeats 1",
     "line_theory.py": "--seeds 2 --points 8",

@@ -1,10 +1,11 @@
 """Signs of a map that was read or saved wrongly: type, byte order, order of lines, more points.
 
-Each public function returns a warning, or "" if what its docstring describes does not occur;
-`filled_lines` also returns the map. The limits lie between the values of sound and of damaged maps
-(`docs/map_evidence.md`).
+`misread`, `interpolated` and `filled_lines` return a warning, or "" if what their docstrings
+describe does not occur; `filled_lines` also returns the map. The limits lie between the values of
+sound and of damaged maps (`docs/map_evidence.md`).
 """
 
+from collections.abc import Iterator
 from dataclasses import replace
 from itertools import product
 
@@ -126,6 +127,12 @@ def interpolated(topography: Topography) -> str:
 
 def _period(lines: Field) -> int:
     """The period of the second or third differences along lines, 0 without one."""
+    above = (period for period, fraction in extrema(lines) if fraction > MIN_EXTREMA)
+    return next(above, 0)
+
+
+def extrema(lines: Field) -> Iterator[tuple[int, float]]:
+    """Periods, and fractions of one position of each at which differences are extreme."""
     some = lines[_sample(len(lines))]
     for order, period in product((2, 3), PERIODS):  # the second do not show halved distances
         differences = np.abs(np.diff(some, order, axis=1))
@@ -135,9 +142,7 @@ def _period(lines: Field) -> int:
             is_peak = (one[1:-1] > one[:-2]) & (one[1:-1] > one[2:])
             positions = is_peak[: is_peak.size // period * period].reshape(-1, period)
             parts = np.array_split(positions, len(mean) // PART)
-            if np.mean([part.mean(axis=0).max() for part in parts]) > MIN_EXTREMA:
-                return period
-    return 0
+            yield period, float(np.mean([part.mean(axis=0).max() for part in parts]))
 
 
 def _mean(differences: Field) -> float:
