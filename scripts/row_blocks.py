@@ -31,7 +31,7 @@ def planned(
     fftw = partial(pyfftw.FFTW, flags=("FFTW_MEASURE",))
     pyfftw.forget_wisdom()
     begun = time.process_time()
-    rows = shared_transforms.RowTransforms(values, lines, LocalRows(points, 1), fftw, 0)
+    rows = shared_transforms.RowTransforms(values, lines, LocalRows(points, 1), fftw, None)
     seconds = time.process_time() - begun
     lines[...] = 0.0
     return rows, seconds

@@ -336,12 +336,12 @@ def test_threads_change_nothing(shape, precision):
 
 @pytest.fixture
 def sizes(monkeypatch):
-    """Sizes of the transforms that are planned; 0 for plans that are not measured."""
+    """Sizes of the transforms that are planned; 0 for those of temporary grids."""
     make, sizes = shared_transforms.planned_transforms, []
 
-    def note(plan, size):
-        sizes.append(size)
-        return make(plan, size)
+    def note(plan, size, is_temporary):
+        sizes.append(0 if is_temporary else size)
+        return make(plan, size, is_temporary=is_temporary)
 
     monkeypatch.setattr(shared_transforms, "planned_transforms", note)
     return sizes

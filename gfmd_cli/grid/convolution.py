@@ -129,5 +129,5 @@ class PaddedTransform:
             self.local_rows,
             self.transposition,
             padded_rows=self.padded_rows,
-            is_measured=not self.is_temporary,
+            is_temporary=self.is_temporary,
         )

@@ -214,7 +214,7 @@ class Grid:
         """All transforms of this grid, in one memory."""
         transposition = self._transposition(self.points // 2 + 1)
         return FieldTransforms(
-            self._memory, self.points, self.rows, transposition, is_measured=not self.is_temporary
+            self._memory, self.points, self.rows, transposition, is_temporary=self.is_temporary
         )
 
     @property

@@ -1,16 +1,16 @@
 """Plans of Fourier transforms: measured once and stored, or estimated.
 
 Measuring compares hundreds of plans, which takes some tenths of a second for each grid and
-precision, however short the transforms are. An estimated plan is found at once; with estimated
-plans, a solve on a large grid takes up to 30 % longer (docs/performance.md). Estimated plans are
-the same in every run without being stored.
+precision, however short the transforms are. An estimated plan is found in some milliseconds; with
+estimated plans, a solve on a large grid takes up to 30 % longer (docs/performance.md). Estimated
+plans are the same in every run, stored or not.
 
-FFTW's wisdom (what it has measured) is stored as text: beside the study of a run, so that a resumed
-run uses the plans of the first one, and in the user's cache for other runs. One process at a time
-measures plans and stores them for the others, so that all processes of a machine compute the same
-bits. The wisdom of each group of transforms is stored on its own, and all processes make their
-plans from this text alone, also that which has measured: FFTW takes parts of a plan from what it
-knows of other transforms, so that a plan would depend on which of them are known.
+FFTW's wisdom (what it has measured or estimated) is stored as text: beside the study of a run, so
+that a resumed run uses the plans of the first one, and in the user's cache for other runs. One
+process at a time measures plans and stores them for the others, so that all processes of a machine
+compute the same bits. The wisdom of each group of transforms is stored on its own, and all
+processes make their plans from this text alone, also that which has measured: FFTW takes parts of a
+plan from what it knows of other transforms, so that a plan would depend on which of them are known.
 """
 
 import hashlib
@@ -146,27 +146,28 @@ def plans() -> str:
     return f"measured {_digest(known)}" if known else "estimated"
 
 
-def planned_transforms(make: Callable[[Planner], T], size: int) -> T:
+def planned_transforms(make: Callable[[Planner], T], size: int, *, is_temporary: bool = False) -> T:
     """The transforms that `make` plans. Plans that are not known yet are measured and stored.
 
-    Below `MIN_MEASURED_POINTS` they are estimated. The time limit of a measurement increases with
-    the number of grid points, `size`; 0 stands for plans that are always estimated.
+    Plans of temporary grids are estimated and stored: an estimate takes up to 20 ms. Those of fewer
+    points than `MIN_MEASURED_POINTS` are estimated in each process. The time limit of a measurement
+    increases with the number of grid points, `size`.
     """
-    is_estimated = are_estimated() or size < MIN_MEASURED_POINTS
-    effort = "FFTW_ESTIMATE" if is_estimated else "FFTW_MEASURE"
+    is_stored = size >= MIN_MEASURED_POINTS and not are_estimated()
+    effort = "FFTW_MEASURE" if is_stored and not is_temporary else "FFTW_ESTIMATE"
     limit = PLANNING_SECONDS[0] + PLANNING_SECONDS[1] * size
     fftw = partial(pyfftw.FFTW, planning_timelimit=limit, flags=(effort,))
     with _planner:
-        key = _key(make)
-        known = _estimates if is_estimated else _known.setdefault(_planning.get(), {})
+        key = _key(make, effort)
+        known = _known.setdefault(_planning.get(), {}) if is_stored else _estimates
         with suppress(KeyError, RuntimeError):  # not known
             return _by_wisdom(known[key], make, fftw)
-        return (_searched if is_estimated else _measured)(known, key, make, fftw)
+        return (_stored if is_stored else _searched)(known, key, make, fftw)
 
 
-def _key(make: Callable[[Planner], Any]) -> str:
+def _key(make: Callable[[Planner], Any], effort: str) -> str:
     """The key of a group of transforms: of the layout and axes of all arrays that it transforms."""
-    problems: list[str] = []
+    problems = [effort]
 
     def record(source: Any, target: Any, *others: Any) -> Any:
         is_in_place = source.ctypes.data == target.ctypes.data
@@ -199,8 +200,8 @@ def _searched(known: Wisdom, key: str, make: Callable[[Planner], T], fftw: parti
     return transforms
 
 
-def _measured(known: Wisdom, key: str, make: Callable[[Planner], T], fftw: partial[Any]) -> T:
-    """The same, measured and stored unless another process has measured them."""
+def _stored(known: Wisdom, key: str, make: Callable[[Planner], T], fftw: partial[Any]) -> T:
+    """The same, stored unless another process has stored them."""
     of_study = _planning.get().folder
     folder = of_study or cache_folder()
     with _planning_lock(folder) as alone:

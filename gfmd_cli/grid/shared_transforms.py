@@ -36,6 +36,8 @@ BLOCK_ROWS = 8  # rows per call where rows of zeros are skipped; each block begi
 CACHE_LINE = 8  # complex numbers in single precision in a line of the cache
 
 Execute = Callable[[], None]
+Planned = Callable[[Callable[[Planner], Any]], Any]
+"""`planned_transforms` for the size of a grid."""
 
 
 class RowTransforms:
@@ -45,13 +47,13 @@ class RowTransforms:
     ----------
     values, lines : the rows as real values and as coefficients
     rows : the threads, and the rows that each transforms
-    size : as of `planned_transforms`
+    planned : makes plans that are needed later
     """
 
     def __init__(
-        self, values: Field, lines: Modes, rows: LocalRows, fftw: Planner, size: int
+        self, values: Field, lines: Modes, rows: LocalRows, fftw: Planner, planned: Planned
     ) -> None:
-        self.values, self.lines, self.pool, self.size = values, lines, rows.pool, size
+        self.values, self.lines, self.pool, self.planned = values, lines, rows.pool, planned
         shares = [_equal_blocks(*part, lines.shape[1]) for part in rows.parts]
 
         def plan(source: Any, target: Any, way: str) -> list[Execute]:
@@ -72,7 +74,7 @@ class RowTransforms:
         side_by_side(self.pool, calls)
 
     @cached_property
-    def _of_block(self) -> list[Any]:
+    def _of_block(self) -> Any:
         """Plans of a block for each thread, made when they are needed."""
         block = pyfftw.empty_aligned((BLOCK_ROWS, self.lines.shape[1]), dtype=self.lines.dtype)
         real = block.view(self.values.dtype)[:, : self.values.shape[1]]
@@ -80,7 +82,7 @@ class RowTransforms:
         def make(fftw: Planner) -> list[Any]:
             return [fftw(real, block, (1,), "FFTW_FORWARD") for _ in range(self._count)]
 
-        return planned_transforms(make, self.size)
+        return self.planned(make)
 
     def backward(self) -> None:
         """Transform all rows back."""
@@ -216,7 +218,7 @@ class FieldTransforms:
     rows : the rows of this process
     transposition : exchange between the processes that share the field; None for one process
     padded_rows : number of rows to which the columns are padded by zeros; 0 for no padding
-    is_measured : whether plans may be measured; otherwise they are estimated
+    is_temporary : as of `planned_transforms`
     """
 
     def __init__(
@@ -227,7 +229,7 @@ class FieldTransforms:
         transposition: Transposition | None,
         *,
         padded_rows: int = 0,
-        is_measured: bool = True,
+        is_temporary: bool = False,
     ) -> None:
         shape = (rows.count, points // 2 + 1)
         self.lines: Modes = memory[0][: prod(shape)].reshape(shape)
@@ -244,14 +246,15 @@ class FieldTransforms:
         self._transposition = transposition
         self._arrays = self.lines, self.work, memory[-1]
 
-        size = len(self.work) * points if is_measured else 0
+        size = len(self.work) * points
+        planned = partial(planned_transforms, size=size, is_temporary=is_temporary)
 
         def make(fftw: Planner) -> tuple[RowTransforms, ColumnTransforms]:
             length = padded_rows or len(self.work)
             along_columns = ColumnTransforms(self.work, rows, fftw, length)
-            return RowTransforms(self.values, self.lines, rows, fftw, size), along_columns
+            return RowTransforms(self.values, self.lines, rows, fftw, planned), along_columns
 
-        self.along_rows, self.along_columns = planned_transforms(make, size)
+        self.along_rows, self.along_columns = planned(make)
 
     def to_columns(self, blocks: Sequence[int] | None = None) -> None:
         """`work` <- `values` transformed along x; `blocks` as in `RowTransforms.forward`."""
