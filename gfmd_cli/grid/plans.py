@@ -43,10 +43,10 @@ Wisdom = dict[str, list[str]]
 """Texts in double and in single precision by the key of a group of transforms."""
 PLANNING_SECONDS = (30.0, 1e-6)  # time limit of a search for a plan: constant, and per grid point
 MIN_MEASURED_POINTS = 2**17  # of a grid; plans of smaller ones are estimated
-"""A compromise. On 256^2 and 400^2, solves take 3 to 13 % longer than if all plans were measured,
-and planning takes less time by that of 57 to 105 solves. With 2^16 these are -1 to 6 % and 30 to
-77, with 2^18 0 to 15 % and 52 to 144 (two runs of `scripts/plan_times.py --points 256 400
---measured-from 0 65536 131072 262144 --repeats 25`)."""
+"""A compromise. On 256^2, solves take 4 to 8 % longer than if all plans were measured, and planning
+takes less time by that of 28 to 51 solves. With 2^18, plans of 400^2 are estimated, too: solves on
+both grids take 6 % less to 14 % more time, and planning less by that of up to 67 solves (two runs
+of `scripts/plan_times.py --points 256 400 --measured-from 0 65536 131072 262144 --repeats 25`)."""
 MAX_WISDOM_BYTES = 2**24  # of a file of wisdom
 MAX_CACHED_LINES = 20000  # of wisdom; a new size adds some 50 and reads and writes all
 KEY = re.compile("[0-9a-f]{16}")
