@@ -408,12 +408,12 @@ def test_blocks_of_rows_are_planned_like_the_grid_when_they_are_needed(planning)
         assert planning() == {effort}
 
 
-@pytest.mark.parametrize(("rows", "sizes"), [(48, {16}), (40, {8}), (46, {46}), (16, {16})])
-def test_rows_are_transformed_in_equal_blocks(monkeypatch, rows, sizes):
+@pytest.mark.parametrize(("rows", "lengths"), [(48, {16}), (40, {8}), (46, {46}), (16, {16})])
+def test_rows_are_transformed_in_equal_blocks(monkeypatch, rows, lengths):
     """Of at most 23 rows here, so that they are of 8 or 16, or of all rows."""
     monkeypatch.setattr(shared_transforms, "PLANNED_COEFFICIENTS", 23 * 7)
     blocks = shared_transforms._equal_blocks(100, 100 + rows, 7)
-    assert {block.stop - block.start for block in blocks} == sizes
+    assert {block.stop - block.start for block in blocks} == lengths
     assert [i for block in blocks for i in range(block.start, block.stop)] == [
         *range(100, 100 + rows)
     ]

@@ -25,6 +25,7 @@ SMALL = {
     "indenter_bars.py": "--points 64 --line-reference 256 --round-reference 128 --exponents 1 "
     "--pressures 1",
     "interpolated_maps.py": "--points 64 --seeds 1 --contacts",
+    "row_blocks.py": "--points 64 --coefficients 512 1e12 --repeats 1",
     "line_bars.py": "--seeds 1 --exponents 1 --finest 512",
     "forecast_pairs.py": "--points 64 --exponents 1 --cutoff 0.1 --repeats 1",
     "line_theory.py": "--seeds 2 --points 8",

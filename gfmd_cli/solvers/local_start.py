@@ -58,7 +58,7 @@ def start_from(
     for contact in finer:
         touching, fraction = pressure > 0, solve_on_tiles.max_fraction(contact.exponents[1])
         if np.count_nonzero(touching) > fraction * touching.size:
-            return None  # known before the tiles are, which take longer
+            return None  # there are at least as many tiles, and to find them takes longer
         tiles = _tiles_in_reach(touching, is_periodic=contact.is_periodic)
         if tiles.count > fraction * tiles.used.size:
             return None

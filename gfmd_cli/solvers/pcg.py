@@ -152,7 +152,7 @@ class ProjectedCG(Solver):
             run.advance(beta)  # [3] to [5]
             state.step += 1
             yield state
-            if state.exact:
+            if state.exact:  # sigma was computed afresh
                 run.classify()
 
 
@@ -183,7 +183,7 @@ class _Run:
         self.classify()
 
     def classify(self) -> None:
-        """Compute the contact state, and all that `assess` stores if sigma was computed from u."""
+        """Compute the contact state; if sigma was computed from u, also the sums of `assess`."""
         fields = (self.h, self.u, self.sigma)
         sums = self.rows.sums(3, kernels.classify, *fields, self.own_state)
         if self.state.exact:
